@@ -1,0 +1,131 @@
+//! Channels: the places of a plant where physics can be added.
+
+/// Where in the equations a channel sits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A generalised effort `w[i]` added to what drives the plant; its flow is a speed.
+    Effort(usize),
+    /// The `i`-th input, between the command in the log and the plant.
+    Input(usize),
+    /// The rate of the `i`-th state, after everything else: mass and inertia act here.
+    Rate(usize),
+    /// A signal on its way to the sensor, by index into states, inputs, outputs in that order.
+    Output(usize),
+}
+
+impl Place {
+    /// The kind of place, as effects declare it.
+    pub const fn kind(self) -> PlaceKind {
+        match self {
+            Place::Effort(_) => PlaceKind::Effort,
+            Place::Input(_) => PlaceKind::Input,
+            Place::Rate(_) => PlaceKind::Body,
+            Place::Output(_) => PlaceKind::Output,
+        }
+    }
+}
+
+/// A kind of place; an effect names those it attaches to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlaceKind {
+    /// See [`Place::Effort`].
+    Effort,
+    /// See [`Place::Input`].
+    Input,
+    /// See [`Place::Rate`].
+    Body,
+    /// See [`Place::Output`].
+    Output,
+}
+
+impl PlaceKind {
+    /// Name used in listings and messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            PlaceKind::Effort => "effort",
+            PlaceKind::Input => "input",
+            PlaceKind::Body => "body",
+            PlaceKind::Output => "output",
+        }
+    }
+}
+
+/// What an effect may read at its channel. A channel binds each role it can offer to a signal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(usize)]
+pub enum Role {
+    /// Speed conjugate to the effort at this channel: shaft speed, joint speed, flow.
+    Flow = 0,
+    /// Integral of the flow: shaft angle, joint angle, level.
+    Position,
+    /// The input that drives this channel, after the effects on that input.
+    Drive,
+    /// Heading of a vehicle.
+    Heading,
+    /// Forward speed of a vehicle.
+    Forward,
+    /// Yaw rate of a vehicle.
+    Yaw,
+    /// Load on the common supply: the sum of the magnitudes of all inputs, or of the currents
+    /// where the plant knows them.
+    Load,
+}
+
+impl Role {
+    /// Number of roles.
+    pub const COUNT: usize = 7;
+    /// All of them, in order.
+    pub const ALL: [Role; Role::COUNT] = [
+        Role::Flow,
+        Role::Position,
+        Role::Drive,
+        Role::Heading,
+        Role::Forward,
+        Role::Yaw,
+        Role::Load,
+    ];
+
+    /// Name used in messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Role::Flow => "flow",
+            Role::Position => "position",
+            Role::Drive => "drive",
+            Role::Heading => "heading",
+            Role::Forward => "forward speed",
+            Role::Yaw => "yaw rate",
+            Role::Load => "supply load",
+        }
+    }
+}
+
+/// One reading a channel offers: the role and the signal that plays it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reads(pub Role, pub &'static str);
+
+/// A place of a plant where effects attach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Channel {
+    /// Identifier, e.g. `wheel.right`.
+    pub id: &'static str,
+    /// Where in the equations.
+    pub place: Place,
+    /// Unit of what is added here.
+    pub unit: &'static str,
+    /// How it enters, e.g. `dv/dt += K_C w`.
+    pub equation: &'static str,
+    /// Signals an effect can read here.
+    pub reads: &'static [Reads],
+    /// `+1` or `-1` where channels come in pairs (right, left), else 0: effects that act
+    /// oppositely on the two sides multiply by it.
+    pub side: i8,
+    /// One sentence.
+    pub doc: &'static str,
+}
+
+impl Channel {
+    /// The signal that plays `role` here, if any.
+    pub fn read(&self, role: Role) -> Option<&'static str> {
+        self.reads.iter().find(|r| r.0 == role).map(|r| r.1)
+    }
+}

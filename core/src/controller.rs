@@ -1,0 +1,76 @@
+//! The role of a controller.
+
+use core::fmt;
+
+use crate::{Real, Tick};
+
+/// What a controller says of the command it wrote.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Command {
+    /// At least one actuator was asked for more than it can give.
+    pub saturated: bool,
+    /// The command is the last safe one, held because no better could be computed.
+    pub held: bool,
+}
+
+/// Why a controller could not compute a command. The loop stops safely on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ControlError {
+    /// Slices of other lengths than those the controller was built for.
+    Sizes,
+}
+
+impl fmt::Display for ControlError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ControlError::Sizes => f.write_str("signals do not fit the controller's sizes"),
+        }
+    }
+}
+
+impl core::error::Error for ControlError {}
+
+/// A plant seen by a controller: `dy/dt = f(y) + G(y) u` for the controlled states `y`.
+pub trait AffineModel<S: Real> {
+    /// Number of controlled states, equal to the number of inputs.
+    fn size(&self) -> usize;
+    /// Drift `f` (length `size`) and input matrix `G` (row by row, `size * size`) at `y`.
+    fn evaluate(&mut self, y: &[S], drift: &mut [S], input_matrix: &mut [S]);
+}
+
+/// Computes the command from reference, measurement and model.
+///
+/// Implementations allocate nothing in [`Controller::step`].
+pub trait Controller<S: Real>: Send {
+    /// Writes the command (one value per input, in the input's unit).
+    ///
+    /// `reference` and `measured` hold the controlled states.
+    fn step(
+        &mut self,
+        tick: &Tick<S>,
+        reference: &[S],
+        measured: &[S],
+        model: &mut dyn AffineModel<S>,
+        command: &mut [S],
+    ) -> Result<Command, ControlError>;
+    /// Forgets integrators and the last command.
+    fn reset(&mut self);
+}
+
+#[cfg(feature = "std")]
+impl<S: Real, C: Controller<S> + ?Sized> Controller<S> for Box<C> {
+    fn step(
+        &mut self,
+        tick: &Tick<S>,
+        reference: &[S],
+        measured: &[S],
+        model: &mut dyn AffineModel<S>,
+        command: &mut [S],
+    ) -> Result<Command, ControlError> {
+        (**self).step(tick, reference, measured, model, command)
+    }
+    fn reset(&mut self) {
+        (**self).reset();
+    }
+}

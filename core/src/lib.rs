@@ -1,0 +1,72 @@
+//! The vocabulary of loopsight: what a plant, an effect, an estimator, a controller and a driver
+//! are, how they are integrated in time, and the tick of the loop that runs them.
+//!
+//! Two views of one component live here:
+//!
+//! * the **static view** ([`Plant`], [`Effect`]): what an author writes once, generic over the
+//!   scalar ([`Real`]), with fixed sizes, without `std` and without an allocator;
+//! * the **dynamic view** ([`Dynamics`], [`Physics`]): the same mathematics behind slices, object
+//!   safe, made from the static view by [`declare_plant!`] and [`declare_effect!`].
+//!
+//! With the feature `std` the registry (typetag), the TOML composition ([`config`]), the composed
+//! [`model::Model`] and its simulation are added. Without it nothing here allocates.
+
+#![cfg_attr(not(feature = "std"), no_std)]
+
+mod channel;
+mod clock;
+mod controller;
+mod driver;
+mod effect;
+mod estimator;
+mod integrator;
+mod parameter;
+mod plant;
+mod real;
+mod signal;
+mod tick;
+pub mod unit;
+
+#[cfg(feature = "std")]
+pub mod config;
+#[cfg(feature = "std")]
+pub mod loop_file;
+#[cfg(feature = "std")]
+pub mod model;
+#[cfg(feature = "std")]
+pub mod registry;
+#[cfg(feature = "std")]
+pub mod run;
+#[cfg(feature = "std")]
+pub mod sensor;
+#[cfg(feature = "std")]
+pub mod simulate;
+
+pub use channel::{Channel, Place, PlaceKind, Reads, Role};
+#[cfg(feature = "std")]
+pub use clock::SystemClock;
+pub use clock::{Clock, SimulatedClock};
+pub use controller::{AffineModel, Command, ControlError, Controller};
+pub use driver::{Driver, DriverError, DriverFault, Sample};
+pub use effect::{Effect, EffectMeta, NoPast, Past, Physics, Reading};
+pub use estimator::{Estimator, Innovation};
+pub use integrator::{Rk4, substeps};
+pub use parameter::Parameter;
+#[doc(hidden)]
+pub use plant::check_sizes as plant_check;
+pub use plant::{ControlAffine, Dynamics, Parameterization, Plant, PlantMeta};
+pub use real::Real;
+#[cfg(feature = "std")]
+pub use real::{DUAL_WIDTH, Dual, derivative, variable};
+pub use signal::Signal;
+pub use tick::{Loop, Observer, Step, Tick, TickError};
+
+#[doc(hidden)]
+pub mod __private {
+    #[cfg(feature = "std")]
+    pub use inventory;
+    #[cfg(feature = "std")]
+    pub use serde;
+    #[cfg(feature = "std")]
+    pub use typetag;
+}

@@ -1,0 +1,676 @@
+//! A model: a plant with effects, sensors and parameter values, composed from TOML.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::config::{ConfigError, ReadError, Source, Step, nearest, read_text};
+use crate::controller::AffineModel;
+use crate::registry::{AnyDynamics, AnyPhysics, EffectPart, HostReal, PlantPart};
+use crate::run::LogMap;
+use crate::sensor::Sensor;
+use crate::{
+    Channel, DUAL_WIDTH, Dual, EffectMeta, Parameter, Place, PlantMeta, Real, Role, Signal,
+    derivative, variable,
+};
+
+/// A model file, as written.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelFile {
+    /// Name of the robot, for titles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// The plant.
+    pub plant: Box<dyn PlantPart>,
+    /// Effects, in the order they are applied.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effect: Vec<Box<dyn EffectPart>>,
+    /// How a log maps on the plant's signals.
+    #[serde(default)]
+    pub log: LogMap,
+    /// How the model is integrated.
+    #[serde(default)]
+    pub simulation: SimulationOptions,
+    /// What a fit estimates.
+    #[serde(default)]
+    pub fit: FitOptions,
+}
+
+/// `[simulation]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulationOptions {
+    /// Longest integration step, s.
+    #[serde(default = "default_step")]
+    pub max_step_s: f64,
+}
+
+fn default_step() -> f64 {
+    0.0025
+}
+
+impl Default for SimulationOptions {
+    fn default() -> Self {
+        Self {
+            max_step_s: default_step(),
+        }
+    }
+}
+
+/// `[fit]`: parameters that a fit estimates or holds, where this differs from their declaration.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitOptions {
+    /// Estimated though declared as known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub free: Vec<String>,
+    /// Held though declared as estimated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixed: Vec<String>,
+}
+
+/// Why a model could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelError {
+    /// The file could not be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A mistake in the file.
+    #[error(transparent)]
+    Config(#[from] Box<ConfigError>),
+    /// No part is linked into the program.
+    #[error(
+        "no plant is known to this program: link the crate that declares it with `use … as _;`"
+    )]
+    EmptyRegistry,
+    /// Parts share an id.
+    #[error("parts with the same id are linked: {}", .0.join(", "))]
+    Duplicates(Vec<String>),
+}
+
+/// A parameter of a composed model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelParameter {
+    /// Name within the model: `K_A`, `coulomb_friction.level`.
+    pub name: String,
+    /// Its declaration.
+    pub declaration: &'static Parameter,
+    /// SI unit, that of the channel filled in.
+    pub unit: String,
+    /// Its value; `None` where neither file nor declaration give one: a fit has to find it.
+    pub value: Option<f64>,
+    /// A fit estimates it.
+    pub free: bool,
+    /// Where it stands in the file.
+    pub path: Vec<Step>,
+}
+
+/// An effect of a composed model, bound to its channels.
+#[derive(Clone)]
+pub struct Attached {
+    /// The declaration.
+    pub meta: &'static EffectMeta,
+    /// The channels, in the order of the file.
+    pub at: Vec<&'static Channel>,
+    /// First of its parameters in [`Model::parameters`].
+    pub first_parameter: usize,
+    pub(crate) physics: &'static dyn AnyPhysics,
+    /// For each channel and role, the index of the signal that plays it.
+    pub(crate) reads: Vec<[Option<usize>; Role::COUNT]>,
+}
+
+/// A measured signal of a composed model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredSignal {
+    /// Index among states, inputs and outputs, in that order.
+    pub index: usize,
+    /// The declaration.
+    pub signal: &'static Signal,
+    /// How the number is made.
+    pub sensor: Sensor,
+}
+
+/// A plant with effects, sensors and parameter values, checked.
+#[derive(Clone)]
+pub struct Model {
+    /// Name of the robot.
+    pub name: String,
+    /// The plant's declaration.
+    pub plant: &'static PlantMeta,
+    /// Plant parameters first, then those of the effects.
+    pub parameters: Vec<ModelParameter>,
+    /// Effects in order.
+    pub effects: Vec<Attached>,
+    /// What is measured, in the order of the signals.
+    pub measured: Vec<MeasuredSignal>,
+    /// How a log maps on the signals.
+    pub log: LogMap,
+    /// Longest integration step, s.
+    pub max_step: f64,
+    pub(crate) dynamics: &'static dyn AnyDynamics,
+    pub(crate) set: usize,
+    pub(crate) n_plant_parameters: usize,
+}
+
+impl std::fmt::Debug for Model {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Model")
+            .field("name", &self.name)
+            .field("plant", &self.plant.id)
+            .field("parameters", &self.parameters)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Signals of a plant by index: states, then inputs, then outputs.
+pub fn signals(plant: &'static PlantMeta) -> impl Iterator<Item = &'static Signal> {
+    plant.states.iter().chain(plant.inputs).chain(plant.outputs)
+}
+
+fn signal_index(plant: &'static PlantMeta, id: &str) -> Option<usize> {
+    signals(plant).position(|s| s.id == id)
+}
+
+impl Model {
+    /// Reads a model file.
+    pub fn load(path: &Path) -> Result<(Self, Source), ModelError> {
+        let text = read_text(path)?;
+        Self::from_toml(&path.display().to_string(), &text)
+    }
+
+    /// Composes a model from TOML; `file` names it in messages.
+    pub fn from_toml(file: &str, text: &str) -> Result<(Self, Source), ModelError> {
+        crate::registry::check()?;
+        let source = Source::parse(file, text)?;
+        let parsed: ModelFile = source.read()?;
+        let model = Self::compose(&parsed, &source)?;
+        Ok((model, source))
+    }
+
+    /// Composes a model from a parsed file; `source` places the errors.
+    pub fn compose(file: &ModelFile, source: &Source) -> Result<Self, Box<ConfigError>> {
+        let plant = file.plant.meta();
+        let values = file.plant.values();
+        let (declared, prefix): (&'static [Parameter], Vec<Step>) = match values.set {
+            0 => (plant.parameters, vec!["plant".into(), plant.id.into()]),
+            set => {
+                let other = &plant.parameterizations[set - 1];
+                (
+                    other.parameters,
+                    vec!["plant".into(), plant.id.into(), other.id.into()],
+                )
+            }
+        };
+        let mut parameters: Vec<ModelParameter> = declared
+            .iter()
+            .zip(&values.given)
+            .map(|(declaration, given)| ModelParameter {
+                name: declaration.id.to_owned(),
+                declaration,
+                unit: declaration.unit.to_owned(),
+                value: given.or(declaration.default),
+                free: declaration.estimated,
+                path: prefix
+                    .iter()
+                    .cloned()
+                    .chain([declaration.id.into()])
+                    .collect(),
+            })
+            .collect();
+        let n_plant_parameters = parameters.len();
+
+        let mut effects = Vec::new();
+        for (index, part) in file.effect.iter().enumerate() {
+            let attached = attach(plant, part.as_ref(), index, &mut parameters, source)?;
+            effects.push(attached);
+        }
+        make_names_unique(&mut parameters, &effects, n_plant_parameters);
+
+        let step = file.simulation.max_step_s;
+        if !(step > 0.0 && step.is_finite()) {
+            return Err(source.error(
+                &["simulation".into(), "max_step_s".into()],
+                &format!("the longest integration step is {step} s, expected a number above 0 s"),
+                None,
+            ));
+        }
+        for (list, free) in [(&file.fit.free, true), (&file.fit.fixed, false)] {
+            for (i, name) in list.iter().enumerate() {
+                let Some(found) = parameters.iter_mut().find(|p| p.name == *name) else {
+                    let key = if free { "free" } else { "fixed" };
+                    let names: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
+                    return Err(source.error(
+                        &["fit".into(), key.into(), i.into()],
+                        &format!(
+                            "unknown parameter `{name}`, expected one of {}",
+                            names.join(", ")
+                        ),
+                        nearest(name, names).map(|n| format!("did you mean `{n}`?")),
+                    ));
+                };
+                found.free = free;
+            }
+        }
+        check_inputs(plant, &file.log, source)?;
+
+        let mut model = Self {
+            name: file.name.clone().unwrap_or_else(|| plant.id.to_owned()),
+            plant,
+            parameters,
+            effects,
+            measured: Vec::new(),
+            log: file.log.clone(),
+            max_step: step,
+            dynamics: file.plant.dynamics(),
+            set: values.set,
+            n_plant_parameters,
+        };
+        let measured: Vec<(String, Sensor)> = file
+            .log
+            .measured
+            .iter()
+            .map(|(id, m)| (id.clone(), m.sensor.clone()))
+            .collect();
+        model.measure(&measured).map_err(|(id, message, help)| {
+            source.error(
+                &["log".into(), "measured".into(), id.as_str().into()],
+                &message,
+                help,
+            )
+        })?;
+        Ok(model)
+    }
+
+    /// Says what is measured: ids of signals with their sensors. An error is `(id, message, help)`.
+    pub fn measure(
+        &mut self,
+        list: &[(String, Sensor)],
+    ) -> Result<(), (String, String, Option<String>)> {
+        let mut measured = Vec::new();
+        for (id, sensor) in list {
+            let index = self.find_signal(id).map_err(|(m, h)| (id.clone(), m, h))?;
+            if let Sensor::EncoderCounts(encoder) = sensor {
+                let counts = encoder.counts_per_revolution;
+                if !(counts > 0.0 && counts.is_finite()) {
+                    return Err((
+                        id.clone(),
+                        format!("counts_per_revolution is {counts}, expected a number above 0"),
+                        None,
+                    ));
+                }
+                for (shaft, gain) in &encoder.of {
+                    self.find_signal(shaft)
+                        .map_err(|(m, h)| (id.clone(), m, h))?;
+                    if !gain.is_finite() {
+                        return Err((id.clone(), format!("the gain of `{shaft}` is {gain}"), None));
+                    }
+                }
+            }
+            let signal = signals(self.plant).nth(index);
+            if let Some(signal) = signal {
+                measured.push(MeasuredSignal {
+                    index,
+                    signal,
+                    sensor: sensor.clone(),
+                });
+            }
+        }
+        measured.sort_by_key(|m| m.index);
+        self.measured = measured;
+        Ok(())
+    }
+
+    /// Index of a signal by id; the error is `(message, help)`.
+    pub fn find_signal(&self, id: &str) -> Result<usize, (String, Option<String>)> {
+        signal_index(self.plant, id).ok_or_else(|| {
+            let ids: Vec<&str> = signals(self.plant).map(|s| s.id).collect();
+            (
+                format!(
+                    "the plant `{}` has no signal `{id}`, expected one of {}",
+                    self.plant.id,
+                    ids.join(", ")
+                ),
+                nearest(id, ids).map(|n| format!("did you mean `{n}`?")),
+            )
+        })
+    }
+
+    /// Values of all parameters, in order; NaN where none is known yet.
+    pub fn values(&self) -> Vec<f64> {
+        self.parameters
+            .iter()
+            .map(|p| p.value.unwrap_or(f64::NAN))
+            .collect()
+    }
+
+    /// Names of the parameters that have no value yet.
+    pub fn missing_values(&self) -> Vec<&str> {
+        self.parameters
+            .iter()
+            .filter(|p| p.value.is_none())
+            .map(|p| p.name.as_str())
+            .collect()
+    }
+
+    /// Sets all values, in order.
+    pub fn set_values(&mut self, values: &[f64]) {
+        for (parameter, value) in self.parameters.iter_mut().zip(values) {
+            parameter.value = value.is_finite().then_some(*value);
+        }
+    }
+
+    /// Number of plant states.
+    pub fn n_states(&self) -> usize {
+        self.plant.states.len()
+    }
+
+    /// Number of signals: states, inputs, outputs.
+    pub fn n_signals(&self) -> usize {
+        self.plant.states.len() + self.plant.inputs.len() + self.plant.outputs.len()
+    }
+
+    /// Number of effort channels.
+    pub fn n_efforts(&self) -> usize {
+        self.plant
+            .channels
+            .iter()
+            .filter(|c| matches!(c.place, Place::Effort(_)))
+            .count()
+    }
+
+    /// Parameters of the plant's equations from the model's values.
+    pub fn lower<S: HostReal>(&self, values: &[S]) -> Vec<S> {
+        let mut p = vec![S::zero(); self.plant.parameters.len()];
+        S::dynamics(self.dynamics).lower(self.set, &values[..self.n_plant_parameters], &mut p);
+        p
+    }
+
+    /// All signals (states, inputs, outputs) at a state and input, without effects.
+    pub fn signals_at<S: HostReal>(&self, p: &[S], x: &[S], u: &[S], y: &mut [S]) {
+        let (nx, nu) = (x.len(), u.len());
+        y[..nx].copy_from_slice(x);
+        y[nx..nx + nu].copy_from_slice(u);
+        S::dynamics(self.dynamics).outputs(x, u, p, &mut y[nx + nu..]);
+    }
+
+    /// Sensitivity of the measured signals to the plant state (measured × states) at `x`, and
+    /// their values there.
+    pub fn measurement_jacobian(&self, values: &[f64], x: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+        let (nx, nu) = (self.n_states(), self.plant.inputs.len());
+        let mut jacobian = DMatrix::zeros(self.measured.len(), nx);
+        let mut value = DVector::zeros(self.measured.len());
+        let p: Vec<Dual> = self.lower(&values.iter().map(|v| Dual::of(*v)).collect::<Vec<_>>());
+        let u = vec![Dual::of(0.0); nu];
+        let mut y = vec![Dual::of(0.0); self.n_signals()];
+        for first in (0..nx).step_by(DUAL_WIDTH) {
+            let last = (first + DUAL_WIDTH).min(nx);
+            let seeded: Vec<Dual> = (0..nx)
+                .map(|i| {
+                    if (first..last).contains(&i) {
+                        variable(x[i], i - first)
+                    } else {
+                        Dual::of(x[i])
+                    }
+                })
+                .collect();
+            self.signals_at(&p, &seeded, &u, &mut y);
+            for (row, m) in self.measured.iter().enumerate() {
+                value[row] = y[m.index].value();
+                for column in first..last {
+                    jacobian[(row, column)] = derivative(&y[m.index], column - first);
+                }
+            }
+        }
+        (jacobian, value)
+    }
+
+    /// The state of least norm that explains the measurement `y` (NaN entries are left out):
+    /// one Gauss–Newton step from the origin, exact where the outputs are linear in the state.
+    pub fn state_from(&self, values: &[f64], y: &[f64]) -> Vec<f64> {
+        let nx = self.n_states();
+        let (mut jacobian, at_zero) = self.measurement_jacobian(values, &vec![0.0; nx]);
+        let mut difference = DVector::zeros(y.len());
+        for (i, value) in y.iter().enumerate() {
+            if value.is_finite() {
+                difference[i] = value - at_zero[i];
+            } else {
+                jacobian.row_mut(i).fill(0.0);
+            }
+        }
+        pseudo_inverse(&jacobian).map_or_else(
+            || vec![0.0; nx],
+            |inverse| (inverse * difference).iter().copied().collect(),
+        )
+    }
+}
+
+/// Moore–Penrose inverse, singular values below 1e-9 of the largest left out; `None` when it
+/// cannot be computed (not finite).
+pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    if matrix.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let largest = matrix.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+    matrix
+        .clone()
+        .pseudo_inverse(1e-9 * largest.max(f64::MIN_POSITIVE))
+        .ok()
+}
+
+fn attach(
+    plant: &'static PlantMeta,
+    part: &dyn EffectPart,
+    index: usize,
+    parameters: &mut Vec<ModelParameter>,
+    source: &Source,
+) -> Result<Attached, Box<ConfigError>> {
+    let meta = part.meta();
+    let base: Vec<Step> = vec!["effect".into(), index.into(), meta.id.into()];
+    let path = |more: &[Step]| -> Vec<Step> { base.iter().chain(more).cloned().collect() };
+    if part.at().is_empty() {
+        let fitting = fitting_channels(plant, meta);
+        return Err(source.error(
+            &base,
+            &format!("`{}` needs `at`: the channels it acts on", meta.id),
+            Some(format!(
+                "channels of `{}` where it fits: {}",
+                plant.id,
+                fitting.join(", ")
+            )),
+        ));
+    }
+    let mut at = Vec::new();
+    let mut reads = Vec::new();
+    for (i, id) in part.at().iter().enumerate() {
+        let channel = plant
+            .channels
+            .iter()
+            .find(|c| c.id == id.as_str())
+            .ok_or_else(|| {
+                let ids: Vec<&str> = plant.channels.iter().map(|c| c.id).collect();
+                source.error(
+                    &path(&["at".into(), i.into()]),
+                    &format!(
+                        "the plant `{}` has no channel `{id}`, expected one of {}",
+                        plant.id,
+                        ids.join(", ")
+                    ),
+                    nearest(id, ids).map(|n| format!("did you mean `{n}`?")),
+                )
+            })?;
+        if let Some(why) = misfit(channel, meta) {
+            let fitting = fitting_channels(plant, meta);
+            return Err(source.error(
+                &path(&["at".into(), i.into()]),
+                &format!("`{}` cannot act on `{id}`: {why}", meta.id),
+                Some(format!("channels where it fits: {}", fitting.join(", "))),
+            ));
+        }
+        let mut bound = [None; Role::COUNT];
+        for role in meta.reads {
+            bound[*role as usize] = channel.read(*role).and_then(|s| signal_index(plant, s));
+        }
+        at.push(channel);
+        reads.push(bound);
+    }
+    let first_parameter = parameters.len();
+    for (declaration, given) in meta.parameters.iter().zip(&part.values().given) {
+        parameters.push(ModelParameter {
+            name: format!("{}.{}", meta.id, declaration.id),
+            declaration,
+            unit: declaration
+                .unit
+                .replace("channel", at.first().map_or("1", |c| c.unit)),
+            value: given.or(declaration.default),
+            free: declaration.estimated,
+            path: path(&[declaration.id.into()]),
+        });
+    }
+    Ok(Attached {
+        meta,
+        at,
+        first_parameter,
+        physics: part.physics(),
+        reads,
+    })
+}
+
+/// Why an effect cannot act on a channel; `None` when it can.
+pub fn misfit(channel: &Channel, effect: &EffectMeta) -> Option<String> {
+    let kind = channel.place.kind();
+    if !effect.places.contains(&kind) {
+        let kinds: Vec<&str> = effect.places.iter().map(|p| p.name()).collect();
+        return Some(format!(
+            "it is a place of kind `{}`, expected `{}`",
+            kind.name(),
+            kinds.join("` or `")
+        ));
+    }
+    effect
+        .reads
+        .iter()
+        .find(|role| channel.read(**role).is_none())
+        .map(|role| {
+            format!(
+                "the effect reads the {}, which this channel does not offer",
+                role.name()
+            )
+        })
+}
+
+fn fitting_channels(plant: &PlantMeta, effect: &EffectMeta) -> Vec<&'static str> {
+    plant
+        .channels
+        .iter()
+        .filter(|c| misfit(c, effect).is_none())
+        .map(|c| c.id)
+        .collect()
+}
+
+/// Two instances of one effect are told apart by their channels.
+fn make_names_unique(parameters: &mut [ModelParameter], effects: &[Attached], first: usize) {
+    let mut count: BTreeMap<String, usize> = BTreeMap::new();
+    for parameter in &parameters[first..] {
+        *count.entry(parameter.name.clone()).or_default() += 1;
+    }
+    for effect in effects {
+        for (i, declaration) in effect.meta.parameters.iter().enumerate() {
+            let parameter = &mut parameters[effect.first_parameter + i];
+            if count.get(&parameter.name).copied().unwrap_or(0) > 1 {
+                let channels: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
+                parameter.name = format!(
+                    "{}@{}.{}",
+                    effect.meta.id,
+                    channels.join("+"),
+                    declaration.id
+                );
+            }
+        }
+    }
+}
+
+fn check_inputs(
+    plant: &'static PlantMeta,
+    log: &LogMap,
+    source: &Source,
+) -> Result<(), Box<ConfigError>> {
+    for id in log.inputs.keys() {
+        if !plant.inputs.iter().any(|s| s.id == id) {
+            let ids: Vec<&str> = plant.inputs.iter().map(|s| s.id).collect();
+            return Err(source.error(
+                &["log".into(), "inputs".into(), id.as_str().into()],
+                &format!(
+                    "the plant `{}` has no input `{id}`, expected one of {}",
+                    plant.id,
+                    ids.join(", ")
+                ),
+                nearest(id, ids).map(|n| format!("did you mean `{n}`?")),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A model as a velocity controller sees it: `dy/dt = f(y) + G(y) u` in the controlled states,
+/// found by probing the plant at zero and at unit inputs.
+#[derive(Clone)]
+pub struct Affine {
+    model: Model,
+    p: Vec<f64>,
+    x: Vec<f64>,
+    u: Vec<f64>,
+    w: Vec<f64>,
+    dx: Vec<f64>,
+}
+
+impl Model {
+    /// The control-affine view with the model's present values; `None` where the plant declares
+    /// no controlled states.
+    pub fn affine(&self) -> Option<Affine> {
+        if self.plant.controlled.is_empty() {
+            return None;
+        }
+        Some(Affine {
+            p: self.lower(&self.values()),
+            x: vec![0.0; self.n_states()],
+            u: vec![0.0; self.plant.inputs.len()],
+            w: vec![0.0; self.n_efforts()],
+            dx: vec![0.0; self.n_states()],
+            model: self.clone(),
+        })
+    }
+}
+
+impl AffineModel<f64> for Affine {
+    fn size(&self) -> usize {
+        self.model.plant.controlled.len()
+    }
+
+    fn evaluate(&mut self, y: &[f64], drift: &mut [f64], input_matrix: &mut [f64]) {
+        let controlled = self.model.plant.controlled;
+        let dynamics = f64::dynamics(self.model.dynamics);
+        let n = controlled.len();
+        if y.len() != n || drift.len() != n || input_matrix.len() != n * n {
+            return;
+        }
+        for (state, value) in controlled.iter().zip(y) {
+            self.x[*state] = *value;
+        }
+        self.u.fill(0.0);
+        dynamics.derivative(&self.x, &self.u, &self.w, &self.p, &mut self.dx);
+        for (row, state) in controlled.iter().enumerate() {
+            drift[row] = self.dx[*state];
+        }
+        for column in 0..n {
+            self.u.fill(0.0);
+            self.u[column] = 1.0;
+            dynamics.derivative(&self.x, &self.u, &self.w, &self.p, &mut self.dx);
+            for (row, state) in controlled.iter().enumerate() {
+                input_matrix[row * n + column] = self.dx[*state] - drift[row];
+            }
+        }
+    }
+}

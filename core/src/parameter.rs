@@ -1,0 +1,160 @@
+//! Parameters, declared once.
+
+/// A number a component depends on: name, symbol, unit, range, default and one sentence.
+///
+/// Help, TOML templates, validation, fits, documentation and reports come from this declaration.
+///
+/// ```
+/// use loopsight_core::Parameter;
+///
+/// const MASS: Parameter = Parameter::new("mass", "m", "kg", "mass of the whole robot").above(0.0);
+/// assert!(MASS.admits(3.0) && !MASS.admits(0.0));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Key in TOML and JSON.
+    pub id: &'static str,
+    /// Symbol in the equations.
+    pub symbol: &'static str,
+    /// SI unit (see [`crate::unit`]).
+    pub unit: &'static str,
+    /// One sentence.
+    pub doc: &'static str,
+    /// Least admissible value.
+    pub min: f64,
+    /// Greatest admissible value.
+    pub max: f64,
+    /// True when `min` and `max` themselves are not admissible.
+    pub open: bool,
+    /// Value when the file gives none; `None` makes the parameter obligatory, unless a fit is to
+    /// find it.
+    pub default: Option<f64>,
+    /// A fit estimates it unless told otherwise. Geometry that was measured with a ruler is not.
+    pub estimated: bool,
+    /// Enters the right-hand side linearly (the others of its kind held): it can be identified by
+    /// linear regression.
+    pub linear: bool,
+    /// Size of a noticeable change, in the parameter's unit: scales a fit when the value is zero.
+    pub scale: f64,
+}
+
+impl Parameter {
+    /// A linear, estimated parameter without bounds and without a default.
+    pub const fn new(
+        id: &'static str,
+        symbol: &'static str,
+        unit: &'static str,
+        doc: &'static str,
+    ) -> Self {
+        Self {
+            id,
+            symbol,
+            unit,
+            doc,
+            min: f64::NEG_INFINITY,
+            max: f64::INFINITY,
+            open: false,
+            default: None,
+            estimated: true,
+            linear: true,
+            scale: 1.0,
+        }
+    }
+
+    /// Restricts the value to `min <= value <= max`.
+    pub const fn within(mut self, min: f64, max: f64) -> Self {
+        self.min = min;
+        self.max = max;
+        self.open = false;
+        self
+    }
+
+    /// Restricts the value to `value > min`.
+    pub const fn above(mut self, min: f64) -> Self {
+        self.min = min;
+        self.open = true;
+        self
+    }
+
+    /// Restricts the value to `value < max`.
+    pub const fn below(mut self, max: f64) -> Self {
+        self.max = max;
+        self.open = true;
+        self
+    }
+
+    /// The value when the file gives none.
+    pub const fn or(mut self, default: f64) -> Self {
+        self.default = Some(default);
+        self
+    }
+
+    /// Held at its value in a fit, unless the model file frees it.
+    pub const fn known(mut self) -> Self {
+        self.estimated = false;
+        self
+    }
+
+    /// Enters the right-hand side non-linearly.
+    pub const fn nonlinear(mut self) -> Self {
+        self.linear = false;
+        self
+    }
+
+    /// Size of a noticeable change, in the parameter's unit.
+    pub const fn scaled(mut self, scale: f64) -> Self {
+        self.scale = scale;
+        self
+    }
+
+    /// Whether `value` lies in the declared range; never true for NaN or infinity.
+    pub fn admits(&self, value: f64) -> bool {
+        if !value.is_finite() {
+            return false;
+        }
+        if self.open {
+            value > self.min && value < self.max
+        } else {
+            value >= self.min && value <= self.max
+        }
+    }
+
+    /// The nearest admissible value; the middle of the range for NaN.
+    pub fn nearest(&self, value: f64) -> f64 {
+        let (low, high) = self.bounds();
+        if value.is_nan() {
+            return if low.is_finite() && high.is_finite() {
+                0.5 * (low + high)
+            } else if low.is_finite() {
+                low + self.scale
+            } else if high.is_finite() {
+                high - self.scale
+            } else {
+                0.0
+            };
+        }
+        value.max(low).min(high)
+    }
+
+    /// Closed bounds: an open end is moved inwards by a millionth of the parameter's scale.
+    pub fn bounds(&self) -> (f64, f64) {
+        let margin = if self.open { 1e-6 * self.scale } else { 0.0 };
+        (self.min + margin, self.max - margin)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_hold() {
+        let p = Parameter::new("k", "k", "1", "a gain").within(-1.0, 2.0);
+        assert!(p.admits(-1.0) && p.admits(2.0) && !p.admits(2.1) && !p.admits(f64::NAN));
+        assert_eq!(p.nearest(7.0), 2.0);
+        assert_eq!(p.nearest(f64::NAN), 0.5);
+        let q = Parameter::new("m", "m", "kg", "a mass").above(0.0);
+        assert!(!q.admits(0.0) && q.admits(1e-9) && !q.admits(f64::INFINITY));
+        assert!(q.nearest(-3.0) > 0.0);
+    }
+}

@@ -1,0 +1,201 @@
+//! The scalar a component is written for.
+
+use core::fmt::Debug;
+use core::ops::{AddAssign, DivAssign, MulAssign, Neg, SubAssign};
+
+use nalgebra::{ClosedAddAssign, ClosedDivAssign, ClosedMulAssign, ClosedSubAssign, Scalar};
+use num_traits::{One, Zero};
+
+/// A real number: `f32` on a microcontroller, `f64` on a desk, a dual number in a fit.
+///
+/// Plants and effects are written once for any `Real`. The elementary functions come from `libm`
+/// for `f32` and `f64` alike, so a loop gives the same digits on every machine.
+///
+/// Comparisons look at the value only: a dual number compares by its real part, so a branch
+/// (a dead zone, say) takes the derivative of the side it is on.
+pub trait Real:
+    Scalar
+    + Copy
+    + Debug
+    + PartialOrd
+    + Zero
+    + One
+    + Neg<Output = Self>
+    + ClosedAddAssign
+    + ClosedSubAssign
+    + ClosedMulAssign
+    + ClosedDivAssign
+    + AddAssign
+    + SubAssign
+    + MulAssign
+    + DivAssign
+    + Send
+    + Sync
+    + 'static
+{
+    /// The number nearest to `value`, with zero derivatives.
+    fn of(value: f64) -> Self;
+    /// The value as `f64`, without derivatives.
+    fn value(self) -> f64;
+    /// Sine of an angle in radians.
+    fn sin(self) -> Self;
+    /// Cosine of an angle in radians.
+    fn cos(self) -> Self;
+    /// Hyperbolic tangent.
+    fn tanh(self) -> Self;
+    /// `e^x`.
+    fn exp(self) -> Self;
+    /// Square root; NaN below zero.
+    fn sqrt(self) -> Self;
+
+    /// Absolute value.
+    fn abs(self) -> Self {
+        if self < Self::zero() { -self } else { self }
+    }
+
+    /// The larger of the two; `self` when either is NaN.
+    fn larger(self, other: Self) -> Self {
+        if other > self { other } else { self }
+    }
+
+    /// The smaller of the two; `self` when either is NaN.
+    fn smaller(self, other: Self) -> Self {
+        if other < self { other } else { self }
+    }
+
+    /// Held within `[low, high]`.
+    fn held(self, low: Self, high: Self) -> Self {
+        self.larger(low).smaller(high)
+    }
+
+    /// Neither infinite nor NaN.
+    fn is_finite(self) -> bool {
+        self.value().is_finite()
+    }
+}
+
+impl Real for f32 {
+    fn of(value: f64) -> Self {
+        value as f32
+    }
+    fn value(self) -> f64 {
+        f64::from(self)
+    }
+    fn sin(self) -> Self {
+        libm::sinf(self)
+    }
+    fn cos(self) -> Self {
+        libm::cosf(self)
+    }
+    fn tanh(self) -> Self {
+        libm::tanhf(self)
+    }
+    fn exp(self) -> Self {
+        libm::expf(self)
+    }
+    fn sqrt(self) -> Self {
+        libm::sqrtf(self)
+    }
+    fn is_finite(self) -> bool {
+        f32::is_finite(self)
+    }
+}
+
+impl Real for f64 {
+    fn of(value: f64) -> Self {
+        value
+    }
+    fn value(self) -> f64 {
+        self
+    }
+    fn sin(self) -> Self {
+        libm::sin(self)
+    }
+    fn cos(self) -> Self {
+        libm::cos(self)
+    }
+    fn tanh(self) -> Self {
+        libm::tanh(self)
+    }
+    fn exp(self) -> Self {
+        libm::exp(self)
+    }
+    fn sqrt(self) -> Self {
+        libm::sqrt(self)
+    }
+}
+
+/// Number of derivatives one [`Dual`] carries; a fit with more parameters makes several passes.
+#[cfg(feature = "std")]
+pub const DUAL_WIDTH: usize = 8;
+
+/// A value with its derivatives by [`DUAL_WIDTH`] quantities at once (forward mode, num-dual).
+#[cfg(feature = "std")]
+pub type Dual = num_dual::DualSVec64<DUAL_WIDTH>;
+
+#[cfg(feature = "std")]
+impl Real for Dual {
+    fn of(value: f64) -> Self {
+        Self::from_re(value)
+    }
+    fn value(self) -> f64 {
+        self.re
+    }
+    fn sin(self) -> Self {
+        num_dual::DualNum::sin(&self)
+    }
+    fn cos(self) -> Self {
+        num_dual::DualNum::cos(&self)
+    }
+    fn tanh(self) -> Self {
+        num_dual::DualNum::tanh(&self)
+    }
+    fn exp(self) -> Self {
+        num_dual::DualNum::exp(&self)
+    }
+    fn sqrt(self) -> Self {
+        num_dual::DualNum::sqrt(&self)
+    }
+}
+
+/// The quantity `value`, differentiated by itself: its `index`-th derivative is one.
+#[cfg(feature = "std")]
+pub fn variable(value: f64, index: usize) -> Dual {
+    debug_assert!(index < DUAL_WIDTH);
+    Dual::from_re(value).derivative(index)
+}
+
+/// The derivative of `dual` by the `index`-th quantity of its pass.
+#[cfg(feature = "std")]
+pub fn derivative(dual: &Dual, index: usize) -> f64 {
+    dual.eps.0.as_ref().map_or(0.0, |d| d[index])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_branch_takes_the_derivative_of_its_side() {
+        let x = variable(-2.0, 3);
+        assert_eq!(Real::abs(x).value(), 2.0);
+        assert_eq!(derivative(&Real::abs(x), 3), -1.0);
+        assert_eq!(derivative(&x.held(Dual::of(-1.0), Dual::of(1.0)), 3), 0.0);
+    }
+
+    #[test]
+    fn elementary_functions_have_their_derivatives() {
+        let h = 1e-6;
+        let functions: [(fn(f64) -> f64, fn(Dual) -> Dual); 5] = [
+            (Real::sin, Real::sin),
+            (Real::cos, Real::cos),
+            (Real::tanh, Real::tanh),
+            (Real::exp, Real::exp),
+            (Real::sqrt, Real::sqrt),
+        ];
+        for (plain, dual) in functions {
+            let numeric = (plain(0.7 + h) - plain(0.7 - h)) / (2.0 * h);
+            assert!((derivative(&dual(variable(0.7, 0)), 0) - numeric).abs() < 1e-9);
+        }
+    }
+}

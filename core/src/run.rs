@@ -1,0 +1,182 @@
+//! Measurements, mapped on the signals of a model.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::sensor::Sensor;
+
+/// One uninterrupted run: what was applied and what was measured, in SI units.
+///
+/// Row `k` of `measured` was taken at `time[k]`; row `k` of `inputs` was applied from `time[k]` to
+/// `time[k + 1]` (zero-order hold).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Run {
+    /// Name, e.g. `slow-forward`; empty when the log holds one run only.
+    pub name: String,
+    /// Time stamps, s, strictly increasing; not necessarily equidistant.
+    pub time: Vec<f64>,
+    /// Inputs, row by row, in the order of the model's inputs.
+    pub inputs: Vec<f64>,
+    /// Measured signals, row by row, in the order of the model's measured signals; NaN: missing.
+    pub measured: Vec<f64>,
+    /// Number of inputs.
+    pub n_inputs: usize,
+    /// Number of measured signals.
+    pub n_measured: usize,
+}
+
+impl Run {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+
+    /// True without any sample.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// From the first to the last time stamp, s.
+    pub fn duration(&self) -> f64 {
+        match (self.time.first(), self.time.last()) {
+            (Some(first), Some(last)) => last - first,
+            _ => 0.0,
+        }
+    }
+
+    /// Inputs applied from `time[k]` on.
+    pub fn input(&self, k: usize) -> &[f64] {
+        &self.inputs[k * self.n_inputs..(k + 1) * self.n_inputs]
+    }
+
+    /// What was measured at `time[k]`.
+    pub fn sample(&self, k: usize) -> &[f64] {
+        &self.measured[k * self.n_measured..(k + 1) * self.n_measured]
+    }
+
+    /// The samples `range`, as a run of their own.
+    pub fn part(&self, range: std::ops::Range<usize>) -> Run {
+        Run {
+            name: self.name.clone(),
+            time: self.time[range.clone()].to_vec(),
+            inputs: self.inputs[range.start * self.n_inputs..range.end * self.n_inputs].to_vec(),
+            measured: self.measured[range.start * self.n_measured..range.end * self.n_measured]
+                .to_vec(),
+            n_inputs: self.n_inputs,
+            n_measured: self.n_measured,
+        }
+    }
+
+    /// Median distance of the time stamps, s; NaN with fewer than two samples.
+    pub fn median_period(&self) -> f64 {
+        let mut steps: Vec<f64> = self.time.windows(2).map(|w| w[1] - w[0]).collect();
+        if steps.is_empty() {
+            return f64::NAN;
+        }
+        let middle = steps.len() / 2;
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+}
+
+/// How the columns of a log map on the signals of a model: the table `[log]` of a model file.
+///
+/// Signals that are not mentioned are looked for by name: the column `linear_velocity_m_per_s`
+/// is the signal `linear_velocity` in m/s.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogMap {
+    /// Column of the time stamps; by default the first column whose name begins with `time` or
+    /// is `t`, with a unit of time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<ColumnMap>,
+    /// Column of a run number or name; rows with another value start a new run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub run: Option<String>,
+    /// Inputs of the plant, by id.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub inputs: BTreeMap<String, ColumnMap>,
+    /// Measured signals, by id. Empty: every signal of the plant for which the log has a column.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub measured: BTreeMap<String, Measured>,
+}
+
+/// A column of a log: its name alone, or with unit and scale.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ColumnMap {
+    /// The name; the unit is read from its ending.
+    Name(String),
+    /// Name, unit, factor.
+    Full(Column),
+}
+
+/// A column with its conversion: SI value = (value in `unit` as SI) times `scale`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Column {
+    /// Name in the header.
+    pub column: String,
+    /// Unit when the name does not end with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// Dimensionless factor; `-1` reverses the sign.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub scale: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "the signature serde asks for"
+)]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
+impl ColumnMap {
+    /// Name in the header.
+    pub fn name(&self) -> &str {
+        match self {
+            ColumnMap::Name(name) => name,
+            ColumnMap::Full(column) => &column.column,
+        }
+    }
+
+    /// Unit given in the model file.
+    pub fn unit(&self) -> Option<&str> {
+        match self {
+            ColumnMap::Name(_) => None,
+            ColumnMap::Full(column) => column.unit.as_deref(),
+        }
+    }
+
+    /// Dimensionless factor.
+    pub fn scale(&self) -> f64 {
+        match self {
+            ColumnMap::Name(_) => 1.0,
+            ColumnMap::Full(column) => column.scale,
+        }
+    }
+}
+
+/// A measured signal: which column, and what kind of sensor made it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measured {
+    /// Name in the header; by default found by the signal's id.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub column: Option<String>,
+    /// Unit when the name does not end with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// Dimensionless factor; `-1` reverses the sign.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale: Option<f64>,
+    /// How the number is made.
+    #[serde(default)]
+    pub sensor: Sensor,
+}
