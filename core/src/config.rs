@@ -142,7 +142,15 @@ impl Source {
 
     /// An error at `path`; the deepest part of it that the document has is pointed at.
     pub fn error(&self, path: &[Step], message: &str, help: Option<String>) -> Box<ConfigError> {
-        let span = self.locate(path);
+        self.error_at(self.locate(path, false), message, help)
+    }
+
+    fn error_at(
+        &self,
+        span: Range<usize>,
+        message: &str,
+        help: Option<String>,
+    ) -> Box<ConfigError> {
         Box::new(make_error(
             &self.file,
             &self.text,
