@@ -167,8 +167,11 @@ impl Source {
             .iter()
             .any(|w| message.starts_with(w));
         if unknown || message.starts_with("field ") {
-            if let Some(name) = names.first() {
-                path.push(Step::Key(name.clone()));
+            // Depending on where serde noticed, the path ends above the key or with it.
+            if let Some(name) = names.first().map(|n| Step::Key(n.clone())) {
+                if path.last() != Some(&name) {
+                    path.push(name);
+                }
             }
         }
         if unknown {
