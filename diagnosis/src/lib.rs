@@ -1,1 +1,16 @@
-//! placeholder
+//! Hold a model against measurements: free run and one-step prediction ([`compare`](compare())),
+//! recursive and output-error fits ([`fit`]) with intervals that mean what they say.
+
+mod compare;
+pub mod fit;
+mod noise;
+mod output_error;
+mod prediction;
+mod regression;
+mod rls;
+mod score;
+
+pub use compare::{CompareError, Comparison, RunTrace, SignalTrace, compare};
+pub use fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
+pub use regression::{Regression, Scheme};
+pub use score::SignalScore;

@@ -1,0 +1,175 @@
+//! A model against measurements: free run and one step.
+
+use loopsight_core::model::Model;
+use loopsight_core::run::Run;
+use loopsight_core::simulate::{Simulator, free_run};
+use loopsight_recordings::Fault;
+use nalgebra::DVector;
+use serde::Serialize;
+
+use crate::prediction::{InitialStates, one_step};
+use crate::score::{SignalScore, Tally, overall};
+
+/// The result of [`compare`].
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// Free-run error over all signals: root mean square of the signals' `nrmse`.
+    pub nrmse: f64,
+    /// `100 (1 - nrmse)`.
+    pub fit_percent: f64,
+    /// Errors of each measured signal.
+    pub signals: Vec<SignalScore>,
+    /// Faults of the log.
+    pub faults: Vec<Fault>,
+    /// Everything a picture needs.
+    #[serde(skip)]
+    pub runs: Vec<RunTrace>,
+}
+
+/// One run: what was applied, measured and predicted.
+#[derive(Clone, Debug)]
+pub struct RunTrace {
+    /// Name of the run; may be empty.
+    pub name: String,
+    /// Time stamps since the start of the run, s.
+    pub time: Vec<f64>,
+    /// Inputs by signal: id, unit, values.
+    pub inputs: Vec<(String, String, Vec<f64>)>,
+    /// Measured signals.
+    pub signals: Vec<SignalTrace>,
+    /// The estimated initial state of the plant.
+    pub initial_state: Vec<f64>,
+}
+
+/// One measured signal of one run; all series are as long as the run's time.
+#[derive(Clone, Debug)]
+pub struct SignalTrace {
+    /// The signal.
+    pub id: String,
+    /// Its unit.
+    pub unit: String,
+    /// What was measured (NaN: missing).
+    pub measured: Vec<f64>,
+    /// The model simulated from the inputs alone.
+    pub free_run: Vec<f64>,
+    /// The model's prediction from the previous sample.
+    pub one_step: Vec<f64>,
+}
+
+/// Why a model cannot be held against a recording.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum CompareError {
+    /// Parameters have no value.
+    #[error("the model gives no value for {}: fit it first, or write the values into the file", .0.join(", "))]
+    MissingValues(Vec<String>),
+    /// Nothing is measured.
+    #[error("the model's log has no measured signal")]
+    NothingMeasured,
+    /// There is no sample.
+    #[error("the recording has no sample")]
+    NoSamples,
+    /// The simulation left the finite numbers.
+    #[error("the free run of `{run}` diverges after {time:.3} s: the model is unstable with these parameters")]
+    Diverged {
+        /// The run.
+        run: String,
+        /// When, s.
+        time: f64,
+    },
+}
+
+/// Simulates `model` over `runs` from the inputs alone, from initial states that are estimated for
+/// each run, and predicts each sample from the one before.
+pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparison, CompareError> {
+    let missing = model.missing_values();
+    if !missing.is_empty() {
+        return Err(CompareError::MissingValues(missing.iter().map(|m| (*m).to_owned()).collect()));
+    }
+    if model.measured.is_empty() {
+        return Err(CompareError::NothingMeasured);
+    }
+    if runs.iter().all(Run::is_empty) {
+        return Err(CompareError::NoSamples);
+    }
+    let values = model.values();
+    let initial = InitialStates::estimate(model, &values, runs);
+    let mut tallies = vec![Tally::default(); model.measured.len()];
+    let mut traces = Vec::with_capacity(runs.len());
+    for (run, x0) in runs.iter().zip(&initial.states) {
+        traces.push(trace(model, &values, run, x0, &mut tallies)?);
+    }
+    let signals: Vec<SignalScore> = tallies
+        .iter()
+        .zip(&model.measured)
+        .map(|(tally, m)| tally.score(m.signal.id, m.signal.unit))
+        .collect();
+    let nrmse = overall(&signals);
+    Ok(Comparison {
+        nrmse,
+        fit_percent: 100.0 * (1.0 - nrmse),
+        signals,
+        faults: faults.to_vec(),
+        runs: traces,
+    })
+}
+
+fn trace(
+    model: &Model,
+    values: &[f64],
+    run: &Run,
+    x0: &DVector<f64>,
+    tallies: &mut [Tally],
+) -> Result<RunTrace, CompareError> {
+    let n = run.len();
+    let column = |of: &dyn Fn(usize) -> f64| (0..n).map(of).collect::<Vec<f64>>();
+    let mut signals: Vec<SignalTrace> = model
+        .measured
+        .iter()
+        .enumerate()
+        .map(|(i, m)| SignalTrace {
+            id: m.signal.id.to_owned(),
+            unit: m.signal.unit.to_owned(),
+            measured: column(&|k| run.sample(k)[i]),
+            free_run: Vec::with_capacity(n),
+            one_step: vec![f64::NAN; n],
+        })
+        .collect();
+    let mut simulator = Simulator::new(model, values);
+    let mut diverged = None;
+    free_run(&mut simulator, x0.as_slice(), run, |k, predicted| {
+        for (signal, value) in signals.iter_mut().zip(predicted) {
+            signal.free_run.push(*value);
+        }
+        if diverged.is_none() && predicted.iter().any(|v| !v.is_finite()) {
+            diverged = Some(run.time[k]);
+        }
+    });
+    if let Some(time) = diverged {
+        return Err(CompareError::Diverged { run: run.name.clone(), time });
+    }
+    one_step(model, values, run, x0.as_slice(), |k, predicted| {
+        for (signal, value) in signals.iter_mut().zip(predicted) {
+            signal.one_step[k] = *value;
+        }
+    });
+    for (tally, signal) in tallies.iter_mut().zip(&signals) {
+        for k in 0..n {
+            tally.add(signal.measured[k], signal.free_run[k]);
+            tally.add_one_step(signal.measured[k], signal.one_step[k]);
+        }
+    }
+    let inputs = model
+        .plant
+        .inputs
+        .iter()
+        .enumerate()
+        .map(|(i, s)| (s.id.to_owned(), s.unit.to_owned(), column(&|k| run.input(k)[i])))
+        .collect();
+    Ok(RunTrace {
+        name: run.name.clone(),
+        time: run.time.clone(),
+        inputs,
+        signals,
+        initial_state: x0.iter().copied().collect(),
+    })
+}
