@@ -30,6 +30,8 @@ pub mod unit;
 #[cfg(feature = "std")]
 pub mod config;
 #[cfg(feature = "std")]
+pub mod excitation;
+#[cfg(feature = "std")]
 pub mod loop_file;
 #[cfg(feature = "std")]
 pub mod model;

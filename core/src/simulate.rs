@@ -1,5 +1,7 @@
 //! A composed model in motion: the free run that everything is judged by.
 
+use std::borrow::Cow;
+
 use crate::model::{Attached, Model};
 use crate::registry::HostReal;
 use crate::run::Run;
@@ -127,7 +129,7 @@ struct Bound {
 /// measured signal that is a mean over the sampling interval.
 #[derive(Clone)]
 pub struct Simulator<'m, S> {
-    model: &'m Model,
+    model: Cow<'m, Model>,
     p: Vec<S>,
     values: Vec<S>,
     memory: Vec<Bound>,
@@ -157,9 +159,20 @@ struct Scratch<S> {
     signals: Vec<S>,
 }
 
+impl<S: HostReal> Simulator<'static, S> {
+    /// As [`Simulator::new`], keeping the model: for a driver, which outlives who builds it.
+    pub fn owning(model: Model, values: &[S]) -> Self {
+        Self::compose(Cow::Owned(model), values)
+    }
+}
+
 impl<'m, S: HostReal> Simulator<'m, S> {
     /// A simulator of `model` with the parameter `values` (as long as `model.parameters`), at rest.
     pub fn new(model: &'m Model, values: &[S]) -> Self {
+        Self::compose(Cow::Borrowed(model), values)
+    }
+
+    fn compose(model: Cow<'m, Model>, values: &[S]) -> Self {
         let nx = model.n_states();
         let (mut memory, mut inputs, mut efforts) = (Vec::new(), Vec::new(), Vec::new());
         let (mut bodies, mut outputs) = (Vec::new(), Vec::new());
@@ -227,7 +240,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             interval: 0.0,
             model,
         };
-        let input = vec![0.0; model.plant.inputs.len()];
+        let input = vec![0.0; simulator.model.plant.inputs.len()];
         simulator.reset(&vec![S::zero(); nx], &input);
         simulator
     }
