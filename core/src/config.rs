@@ -192,6 +192,18 @@ impl Source {
         self.error(&path, message, None)
     }
 
+    /// The text with numbers replaced or added at the paths given; everything else, comments
+    /// included, stays as it was written.
+    pub fn with_values(&self, values: &[(Vec<Step>, f64)]) -> String {
+        let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
+            return self.text.clone();
+        };
+        for (path, value) in values {
+            set_value(document.as_item_mut(), path, *value);
+        }
+        document.to_string()
+    }
+
     /// Where the value at `path`, or the deepest known part of it, stands; with `key`, where the
     /// last key of the path stands.
     fn locate(&self, path: &[Step], key: bool) -> Range<usize> {
@@ -213,6 +225,40 @@ impl Source {
             node = next;
         }
         span
+    }
+}
+
+/// Sets the number at `path` below `item`, keeping what stands around it.
+fn set_value(item: &mut Item, path: &[Step], value: f64) {
+    match path {
+        [] => {}
+        [Step::Key(key)] => {
+            let Some(table) = item.as_table_like_mut() else {
+                return;
+            };
+            let mut new = toml_edit::Value::from(value);
+            if let Some(old) = table.get(key).and_then(Item::as_value) {
+                *new.decor_mut() = old.decor().clone();
+            }
+            table.insert(key, Item::Value(new));
+        }
+        [Step::Key(key), rest @ ..] => {
+            let next = item.as_table_like_mut().and_then(|t| t.get_mut(key));
+            if let Some(next) = next {
+                set_value(next, rest, value);
+            }
+        }
+        [Step::Index(index), rest @ ..] => {
+            let table = item
+                .as_array_of_tables_mut()
+                .and_then(|a| a.get_mut(*index));
+            let [Step::Key(part), rest @ ..] = rest else {
+                return;
+            };
+            if let Some(next) = table.and_then(|t| t.get_mut(part)) {
+                set_value(next, rest, value);
+            }
+        }
     }
 }
 
@@ -355,6 +401,23 @@ mod tests {
         let error = source.read::<Thing>().unwrap_err();
         assert_eq!((error.line, error.column), (2, 14));
         assert!(error.message.contains("invalid type"), "{}", error.message);
+    }
+
+    #[test]
+    fn values_are_replaced_and_comments_kept() {
+        let text = "# robot\n[plant.a]\nk = 1.0 # first\n\n[[effect]]\n[effect.b]\nat = [\"x\"]\n";
+        let source = Source::parse("m.toml", text).unwrap();
+        let new = source.with_values(&[
+            (vec!["plant".into(), "a".into(), "k".into()], -2.5),
+            (
+                vec!["effect".into(), 0.into(), "b".into(), "level".into()],
+                0.25,
+            ),
+        ]);
+        assert_eq!(
+            new,
+            "# robot\n[plant.a]\nk = -2.5 # first\n\n[[effect]]\n[effect.b]\nat = [\"x\"]\nlevel = 0.25\n"
+        );
     }
 
     #[test]

@@ -32,11 +32,15 @@ pub mod config;
 #[cfg(feature = "std")]
 pub mod excitation;
 #[cfg(feature = "std")]
+pub mod identification;
+#[cfg(feature = "std")]
 pub mod loop_file;
 #[cfg(feature = "std")]
 pub mod model;
 #[cfg(feature = "std")]
 pub mod registry;
+#[cfg(feature = "std")]
+pub mod regression;
 #[cfg(feature = "std")]
 pub mod run;
 #[cfg(feature = "std")]

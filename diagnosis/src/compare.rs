@@ -26,6 +26,19 @@ pub struct Comparison {
     pub runs: Vec<RunTrace>,
 }
 
+impl Comparison {
+    /// A comparison with nothing, to be filled in.
+    pub(crate) fn empty() -> Self {
+        Self {
+            nrmse: f64::NAN,
+            fit_percent: f64::NAN,
+            signals: Vec::new(),
+            faults: Vec::new(),
+            runs: Vec::new(),
+        }
+    }
+}
+
 /// One run: what was applied, measured and predicted.
 #[derive(Clone, Debug)]
 pub struct RunTrace {
@@ -69,7 +82,9 @@ pub enum CompareError {
     #[error("the recording has no sample")]
     NoSamples,
     /// The simulation left the finite numbers.
-    #[error("the free run of `{run}` diverges after {time:.3} s: the model is unstable with these parameters")]
+    #[error(
+        "the free run of `{run}` diverges after {time:.3} s: the model is unstable with these parameters"
+    )]
     Diverged {
         /// The run.
         run: String,
@@ -83,7 +98,9 @@ pub enum CompareError {
 pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparison, CompareError> {
     let missing = model.missing_values();
     if !missing.is_empty() {
-        return Err(CompareError::MissingValues(missing.iter().map(|m| (*m).to_owned()).collect()));
+        return Err(CompareError::MissingValues(
+            missing.iter().map(|m| (*m).to_owned()).collect(),
+        ));
     }
     if model.measured.is_empty() {
         return Err(CompareError::NothingMeasured);
@@ -145,7 +162,10 @@ fn trace(
         }
     });
     if let Some(time) = diverged {
-        return Err(CompareError::Diverged { run: run.name.clone(), time });
+        return Err(CompareError::Diverged {
+            run: run.name.clone(),
+            time,
+        });
     }
     one_step(model, values, run, x0.as_slice(), |k, predicted| {
         for (signal, value) in signals.iter_mut().zip(predicted) {
@@ -163,7 +183,13 @@ fn trace(
         .inputs
         .iter()
         .enumerate()
-        .map(|(i, s)| (s.id.to_owned(), s.unit.to_owned(), column(&|k| run.input(k)[i])))
+        .map(|(i, s)| {
+            (
+                s.id.to_owned(),
+                s.unit.to_owned(),
+                column(&|k| run.input(k)[i]),
+            )
+        })
         .collect();
     Ok(RunTrace {
         name: run.name.clone(),

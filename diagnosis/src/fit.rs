@@ -33,7 +33,11 @@ pub struct FitSettings {
 
 impl Default for FitSettings {
     fn default() -> Self {
-        Self { method: Method::OutputError, scheme: Scheme::Integrated, max_iterations: 100 }
+        Self {
+            method: Method::OutputError,
+            scheme: Scheme::Integrated,
+            max_iterations: 100,
+        }
     }
 }
 
@@ -132,13 +136,17 @@ pub enum FitError {
     #[error("the model gives no value for {}, and a fit does not estimate it: write it into the file, or name it under `free` in [fit]", .0.join(", "))]
     Unknown(Vec<String>),
     /// A parameter that the regression cannot estimate.
-    #[error("`{parameter}` enters the equations non-linearly: recursive least squares cannot estimate it; use --method output-error, or name it under `fixed` in [fit]")]
+    #[error(
+        "`{parameter}` enters the equations non-linearly: recursive least squares cannot estimate it; use --method output-error, or name it under `fixed` in [fit]"
+    )]
     NotLinear {
         /// Its name.
         parameter: String,
     },
     /// The plant offers no regression.
-    #[error("the plant `{0}` declares no controlled states, so there is no regression for recursive least squares; use --method output-error")]
+    #[error(
+        "the plant `{0}` declares no controlled states, so there is no regression for recursive least squares; use --method output-error"
+    )]
     NoRegression(String),
     /// The solver gave up.
     #[error("the solver gave up: {0}")]
@@ -180,7 +188,10 @@ pub fn fit(
     let samples: usize = runs.iter().map(Run::len).sum();
     let free = model.parameters.iter().filter(|p| p.free).count();
     if samples * model.measured.len() <= free {
-        return Err(FitError::TooFewSamples { samples, parameters: free });
+        return Err(FitError::TooFewSamples {
+            samples,
+            parameters: free,
+        });
     }
     let before = compare(model, runs, &[]).ok().map(|c| c.nrmse);
     let mut result = match settings.method {

@@ -1,0 +1,277 @@
+//! The equations of a plant as linear regressions in its parameters.
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::Dynamics;
+use crate::model::{Model, pseudo_inverse};
+use crate::registry::HostReal;
+
+/// How a regression is made from samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scheme {
+    /// Euler's, the paper's (40)(41): `(u(k+1) - u(k))/T = φ(u(k), V(k)) θ`. Biased on a
+    /// continuous robot: it estimates `(e^{K_A T} - 1)/T` where `K_A` is meant.
+    Euler,
+    /// Integrated over the period: `(u(k+1) - u(k))/T = 1/T ∫ φ dt θ`, the integral by the
+    /// trapezoidal rule; its bias is of order `(K_A T)²/12`. Where the sensor itself is a mean over
+    /// the period, the difference of two means is an integral weighted by a triangle over two
+    /// periods, and the inputs of both periods count half each.
+    #[default]
+    Integrated,
+}
+
+/// Why a model offers no regression.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RegressionError {
+    /// The plant declares no controlled states.
+    #[error("the plant `{0}` declares no controlled states, so its equations give no regression")]
+    NoControlledStates(String),
+    /// A free parameter enters non-linearly.
+    #[error("`{0}` enters the equations non-linearly, so a linear regression cannot estimate it")]
+    NotLinear(String),
+    /// A known parameter has no value.
+    #[error("`{0}` has no value, and a regression does not estimate it")]
+    Unknown(String),
+}
+
+/// One scalar regression `y = φ · θ` per controlled state, fed sample by sample.
+///
+/// The regressors come from the plant's own equations: `φ_j` is the change of the state's rate when
+/// parameter `j` alone is one, so estimators, fits and the plant cannot disagree. Nothing is
+/// allocated after construction.
+#[derive(Clone)]
+pub struct Regression {
+    model: Model,
+    scheme: Scheme,
+    base: Vec<f64>,
+    rows: Vec<Row>,
+    to_state: DMatrix<f64>,
+    offset: DVector<f64>,
+    means: bool,
+    previous: Option<Previous>,
+    x: DVector<f64>,
+    difference: DVector<f64>,
+    x_before: Vec<f64>,
+    input_before: Vec<f64>,
+    input_mean: Vec<f64>,
+    p: Vec<f64>,
+    dx: Vec<f64>,
+    w: Vec<f64>,
+    values: Vec<f64>,
+}
+
+#[derive(Clone, Copy)]
+struct Previous {
+    time: f64,
+    period: Option<f64>,
+}
+
+#[derive(Clone)]
+struct Row {
+    state: usize,
+    parameters: Vec<usize>,
+    phi: Vec<f64>,
+    y: f64,
+}
+
+impl Regression {
+    /// The regressions of `model` in its free parameters.
+    pub fn new(model: &Model, scheme: Scheme) -> Result<Self, RegressionError> {
+        if model.plant.controlled.is_empty() {
+            return Err(RegressionError::NoControlledStates(
+                model.plant.id.to_owned(),
+            ));
+        }
+        let mut base = Vec::new();
+        for parameter in &model.parameters {
+            base.push(match (parameter.free, parameter.value) {
+                (true, _) if !parameter.declaration.linear => {
+                    return Err(RegressionError::NotLinear(parameter.name.clone()));
+                }
+                (true, _) => 0.0,
+                (false, Some(value)) => value,
+                (false, None) => return Err(RegressionError::Unknown(parameter.name.clone())),
+            });
+        }
+        let nx = model.n_states();
+        let (jacobian, offset) = model.measurement_jacobian(&base, &vec![0.0; nx]);
+        let to_state =
+            pseudo_inverse(&jacobian).unwrap_or_else(|| DMatrix::zeros(nx, offset.len()));
+        let mut regression = Self {
+            scheme,
+            rows: Vec::new(),
+            means: model.measured.iter().any(|m| m.sensor.is_mean()),
+            previous: None,
+            x: DVector::zeros(nx),
+            difference: DVector::zeros(offset.len()),
+            x_before: vec![0.0; nx],
+            input_before: vec![0.0; model.plant.inputs.len()],
+            input_mean: vec![0.0; model.plant.inputs.len()],
+            p: vec![0.0; model.plant.parameters.len()],
+            dx: vec![0.0; nx],
+            w: vec![0.0; model.n_efforts()],
+            values: base.clone(),
+            to_state,
+            offset,
+            base,
+            model: model.clone(),
+        };
+        regression.find_rows();
+        Ok(regression)
+    }
+
+    /// A parameter belongs to a row when it moves that state's rate anywhere: tried at a few
+    /// points without symmetry.
+    fn find_rows(&mut self) {
+        let nx = self.model.n_states();
+        for &state in self.model.plant.controlled {
+            let mut parameters = Vec::new();
+            for (j, parameter) in self.model.parameters.clone().iter().enumerate() {
+                let moves = parameter.free
+                    && (0..3).any(|trial| {
+                        let x: Vec<f64> = (0..nx)
+                            .map(|i| 0.37 + 0.21 * (i as f64 + trial as f64))
+                            .collect();
+                        let u: Vec<f64> = (0..self.input_mean.len())
+                            .map(|i| 1.3 - 0.7 * (i as f64) + 0.3 * trial as f64)
+                            .collect();
+                        self.regressor(&x, &u, state, j) != 0.0
+                    });
+                if moves {
+                    parameters.push(j);
+                }
+            }
+            let phi = vec![0.0; parameters.len()];
+            self.rows.push(Row {
+                state,
+                parameters,
+                phi,
+                y: 0.0,
+            });
+        }
+    }
+
+    fn rate(&mut self, x: &[f64], u: &[f64], unit: Option<usize>) {
+        self.values.copy_from_slice(&self.base);
+        if let Some(j) = unit {
+            self.values[j] = 1.0;
+        }
+        let dynamics: &dyn Dynamics<f64> = f64::dynamics(self.model.dynamics);
+        dynamics.lower(
+            self.model.set,
+            &self.values[..self.model.n_plant_parameters],
+            &mut self.p,
+        );
+        dynamics.derivative(x, u, &self.w, &self.p, &mut self.dx);
+    }
+
+    fn regressor(&mut self, x: &[f64], u: &[f64], state: usize, j: usize) -> f64 {
+        self.rate(x, u, None);
+        let zero = self.dx[state];
+        self.rate(x, u, Some(j));
+        self.dx[state] - zero
+    }
+
+    /// Number of scalar regressions.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// True without any regression.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Indices (into the model's parameters) of the `row`-th regression's `θ`.
+    pub fn parameters(&self, row: usize) -> &[usize] {
+        &self.rows[row].parameters
+    }
+
+    /// Regressor and left-hand side of the `row`-th regression, after a [`Regression::push`] that
+    /// returned true.
+    pub fn row(&self, row: usize) -> (&[f64], f64) {
+        (&self.rows[row].phi, self.rows[row].y)
+    }
+
+    /// Forgets the samples: a new run begins.
+    pub fn restart(&mut self) {
+        self.previous = None;
+    }
+
+    /// Takes the sample at `time`, with the `input` that was applied since the one before. True
+    /// when regressors are ready; false at the start of a run or when something is not finite.
+    pub fn push(&mut self, time: f64, measured: &[f64], input: &[f64]) -> bool {
+        for (to, (value, offset)) in self
+            .difference
+            .iter_mut()
+            .zip(measured.iter().zip(self.offset.iter()))
+        {
+            *to = value - offset;
+        }
+        let usable = self.difference.iter().chain(input).all(|v| v.is_finite()) && time.is_finite();
+        if !usable {
+            self.previous = None;
+            return false;
+        }
+        self.to_state.mul_to(&self.difference, &mut self.x);
+        let mut ready = false;
+        let mut period = None;
+        if let Some(before) = self.previous {
+            let step = time - before.time;
+            if step > 0.0 {
+                period = Some(step);
+                ready = self.fill(step, before.period, input);
+            }
+        }
+        self.x_before.copy_from_slice(self.x.as_slice());
+        self.input_before.copy_from_slice(input);
+        self.previous = Some(Previous { time, period });
+        ready
+    }
+
+    fn fill(&mut self, step: f64, step_before: Option<f64>, input: &[f64]) -> bool {
+        self.input_mean.copy_from_slice(input);
+        let mut distance = step;
+        if self.scheme == Scheme::Integrated && self.means {
+            let Some(before) = step_before else {
+                return false;
+            };
+            // The means lie in the middles of their periods.
+            distance = 0.5 * (step + before);
+            let share = before / (step + before);
+            for (mean, (now, earlier)) in self
+                .input_mean
+                .iter_mut()
+                .zip(input.iter().zip(&self.input_before))
+            {
+                *mean = share * earlier + (1.0 - share) * now;
+            }
+        }
+        let after = core::mem::replace(&mut self.x, DVector::zeros(0));
+        let before = core::mem::take(&mut self.x_before);
+        let u = core::mem::take(&mut self.input_mean);
+        let mut rows = core::mem::take(&mut self.rows);
+        for row in &mut rows {
+            self.rate(&before, &u, None);
+            let mut drift = self.dx[row.state];
+            if self.scheme == Scheme::Integrated {
+                self.rate(after.as_slice(), &u, None);
+                drift = 0.5 * (drift + self.dx[row.state]);
+            }
+            for (phi, &j) in row.phi.iter_mut().zip(&row.parameters) {
+                *phi = self.regressor(&before, &u, row.state, j);
+                if self.scheme == Scheme::Integrated {
+                    *phi = 0.5 * (*phi + self.regressor(after.as_slice(), &u, row.state, j));
+                }
+            }
+            row.y = (after[row.state] - before[row.state]) / distance - drift;
+        }
+        self.rows = rows;
+        self.input_mean = u;
+        self.x_before = before;
+        self.x = after;
+        true
+    }
+}

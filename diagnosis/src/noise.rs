@@ -1,0 +1,226 @@
+//! Standard errors in coloured noise.
+
+use nalgebra::DMatrix;
+
+/// A first-order noise model `e(k) = a e(k-1) + ε(k) + c ε(k-1)` with white `ε`.
+///
+/// Rounding to encoder counts and differencing gives `a = 0, c = -1`; a model error that lasts
+/// gives `a` near 1. (G. E. P. Box, G. M. Jenkins, 1976, "Time Series Analysis", section 3.4; the
+/// parameters by conditional least squares, chapter 7.)
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Arma {
+    pub(crate) a: f64,
+    pub(crate) c: f64,
+    /// Variance of `ε`.
+    pub(crate) variance: f64,
+}
+
+/// Largest magnitude of `a`: beyond it the noise would not have a variance to speak of.
+const LARGEST_A: f64 = 0.999;
+
+impl Arma {
+    /// Fits the model to the residuals of several runs (missing samples are zero).
+    pub(crate) fn fit(series: &[&[f64]]) -> Self {
+        let n: usize = series.iter().map(|s| s.len()).sum();
+        if n < 10 {
+            let variance = series
+                .iter()
+                .flat_map(|s| s.iter())
+                .map(|e| e * e)
+                .sum::<f64>()
+                / n.max(1) as f64;
+            return Self {
+                a: 0.0,
+                c: 0.0,
+                variance,
+            };
+        }
+        let cost = |a: f64, c: f64| -> f64 {
+            series
+                .iter()
+                .map(|s| {
+                    let (mut e_before, mut eps) = (0.0, 0.0);
+                    let mut sum = 0.0;
+                    for e in *s {
+                        eps = e - a * e_before - c * eps;
+                        e_before = *e;
+                        sum += eps * eps;
+                    }
+                    sum
+                })
+                .sum()
+        };
+        // The surface is smooth but has a ridge along a = -c: a coarse grid, then a pattern search.
+        let mut best = (f64::INFINITY, 0.0, 0.0);
+        for a in [-0.6, 0.0, 0.5, 0.9, 0.98] {
+            for c in [-1.0, -0.9, -0.5, 0.0, 0.5] {
+                let value = cost(a, c);
+                if value < best.0 {
+                    best = (value, a, c);
+                }
+            }
+        }
+        let mut step: f64 = 0.2;
+        while step > 1e-4 {
+            let (_, a, c) = best;
+            let mut better = best;
+            for (da, dc) in [
+                (1., 0.),
+                (-1., 0.),
+                (0., 1.),
+                (0., -1.),
+                (1., 1.),
+                (-1., -1.),
+                (1., -1.),
+                (-1., 1.),
+            ] {
+                let a = (a + da * step).clamp(-LARGEST_A, LARGEST_A);
+                let c = (c + dc * step).clamp(-1.0, 0.99);
+                let value = cost(a, c);
+                if value < better.0 {
+                    better = (value, a, c);
+                }
+            }
+            if better.0 < best.0 {
+                best = better;
+            } else {
+                step *= 0.5;
+            }
+        }
+        Self {
+            a: best.1,
+            c: best.2,
+            variance: best.0 / n as f64,
+        }
+    }
+
+    /// Transposed colouring: `Hᵀ j` with `e = H ε`, in place. With it
+    /// `jᵀ cov(e) j = variance · |Hᵀ j|²`.
+    pub(crate) fn transpose(&self, j: &mut [f64]) {
+        // H = (I - a L)⁻¹ (I + c L), so Hᵀ = (I + c Lᵀ)(I - a Lᵀ)⁻¹ runs backwards in time.
+        let mut later = 0.0;
+        for value in j.iter_mut().rev() {
+            *value += self.a * later;
+            later = *value;
+        }
+        for k in 0..j.len() {
+            let next = j.get(k + 1).copied().unwrap_or(0.0);
+            j[k] += self.c * next;
+        }
+    }
+}
+
+/// Residuals and sensitivities of one signal in one run.
+pub(crate) struct Block {
+    /// Index of the signal.
+    pub(crate) signal: usize,
+    /// Residuals by sample.
+    pub(crate) residual: Vec<f64>,
+    /// Sensitivities: samples × unknowns, weighted as in the fit.
+    pub(crate) jacobian: DMatrix<f64>,
+}
+
+/// Covariance of a least-squares estimate when the noise of each signal is coloured:
+/// `(JᵀJ)⁻¹ Jᵀ cov(e) J (JᵀJ)⁻¹` with `cov(e)` from a noise model per signal, fitted to the
+/// residuals of all runs (T. Söderström, P. Stoica, 1989, "System Identification", section 7.4
+/// and complement C7.4, for the estimate; the noise models are [`Arma`]).
+///
+/// Returns the covariance and the noise models; `inverse_gram` is `(JᵀJ)⁻¹` or its pseudo-inverse.
+pub(crate) fn covariance(
+    blocks: &[Block],
+    n_signals: usize,
+    inverse_gram: &DMatrix<f64>,
+    unknowns: usize,
+) -> (DMatrix<f64>, Vec<Arma>) {
+    let samples: usize = blocks.iter().map(|b| b.residual.len()).sum();
+    let models: Vec<Arma> = (0..n_signals)
+        .map(|signal| {
+            let series: Vec<&[f64]> = blocks
+                .iter()
+                .filter(|b| b.signal == signal)
+                .map(|b| b.residual.as_slice())
+                .collect();
+            Arma::fit(&series)
+        })
+        .collect();
+    // Degrees of freedom that the fit has used up.
+    let inflation = samples as f64 / (samples.saturating_sub(unknowns)).max(1) as f64;
+    let columns = inverse_gram.ncols();
+    let mut meat = DMatrix::zeros(columns, columns);
+    for block in blocks {
+        let model = models[block.signal];
+        let mut coloured = block.jacobian.clone();
+        for mut column in coloured.column_iter_mut() {
+            model.transpose(column.as_mut_slice());
+        }
+        meat += coloured.tr_mul(&coloured) * (model.variance * inflation);
+    }
+    (inverse_gram * meat * inverse_gram, models)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A fixed pseudo-random sequence, uniform in ±½.
+    fn white(n: usize, seed: u64) -> Vec<f64> {
+        let mut state = seed;
+        (0..n)
+            .map(|_| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+            })
+            .collect()
+    }
+
+    #[test]
+    fn differenced_rounding_is_recognised() {
+        let q = white(3001, 1);
+        let e: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
+        let model = Arma::fit(&[&e]);
+        assert!(model.a.abs() < 0.1 && model.c < -0.97, "{model:?}");
+        assert!((model.variance - 1.0 / 12.0).abs() < 0.01, "{model:?}");
+    }
+
+    #[test]
+    fn a_slow_disturbance_is_recognised() {
+        let mut e = white(4000, 2);
+        for k in 1..e.len() {
+            e[k] += 0.9 * e[k - 1];
+        }
+        let model = Arma::fit(&[&e]);
+        assert!(
+            (model.a - 0.9).abs() < 0.03 && model.c.abs() < 0.1,
+            "{model:?}"
+        );
+    }
+
+    /// `jᵀ cov(e) j` against the covariance matrix written out.
+    #[test]
+    fn transposed_colouring_gives_the_quadratic_form() {
+        let model = Arma {
+            a: 0.6,
+            c: -0.3,
+            variance: 1.0,
+        };
+        let n = 12;
+        let mut h = DMatrix::<f64>::zeros(n, n);
+        for column in 0..n {
+            let (mut e_before, mut eps_before) = (0.0, 0.0);
+            for row in 0..n {
+                let eps = if row == column { 1.0 } else { 0.0 };
+                let e = model.a * e_before + eps + model.c * eps_before;
+                h[(row, column)] = e;
+                (e_before, eps_before) = (e, eps);
+            }
+        }
+        let j = white(n, 3);
+        let expected = (h.transpose() * nalgebra::DVector::from_vec(j.clone())).norm_squared();
+        let mut coloured = j;
+        model.transpose(&mut coloured);
+        let got: f64 = coloured.iter().map(|v| v * v).sum();
+        assert!((got - expected).abs() < 1e-12 * expected);
+    }
+}

@@ -1,0 +1,493 @@
+//! Least squares on the error of the free run.
+
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+
+use basin::{
+    BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet, Constraints,
+    Executor, Jacobian, Residual, TerminationCode,
+};
+use loopsight_core::model::{Model, pseudo_inverse};
+use loopsight_core::run::Run;
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use crate::compare::Comparison;
+use crate::fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
+use crate::noise::{self, Block};
+use crate::prediction::{InitialStates, predict, residuals, sensitivities, visible_states};
+use crate::regression::batch;
+use crate::score::Tally;
+
+/// Fits the free parameters and the initial states of all runs.
+///
+/// With `ŷ(θ, x₀)` the free run as the sensors would have read it, and each signal weighted by its
+/// standard deviation,
+///
+/// ```text
+/// θ, x₀ = argmin Σ_runs Σ_k Σ_i ((y_i(k) - ŷ_i(k))/std(y_i))²
+/// ```
+///
+/// by Levenberg–Marquardt within the ranges of the declarations, with exact derivatives (dual
+/// numbers through the integrator). Missing measurements count nothing. (L. Ljung, 1999, "System
+/// Identification", 2nd edition, section 7.2 and chapter 10; output error is section 4.2.)
+pub(crate) fn fit(
+    model: &Model,
+    runs: &[Run],
+    settings: &FitSettings,
+    progress: &(dyn Fn(u64, f64) + Sync),
+) -> Result<Fit, FitError> {
+    let problem = Problem::new(model, runs, progress)?;
+    let start = problem.start(settings)?;
+    let iterations = Cell::new(0);
+    let solution = problem.solve(&start, settings.max_iterations, &iterations)?;
+    Ok(problem.result(&solution, iterations.get()))
+}
+
+struct Problem<'a> {
+    model: &'a Model,
+    runs: &'a [Run],
+    progress: &'a (dyn Fn(u64, f64) + Sync),
+    /// Indices of the estimated parameters.
+    free: Vec<usize>,
+    /// Plant states whose initial values are estimated.
+    visible: Vec<usize>,
+    /// One over the standard deviation of each signal, over the root of the number of samples.
+    weights: Vec<f64>,
+    /// Unknown = scaled unknown × scale.
+    scales: Vec<f64>,
+    lower: DVector<f64>,
+    upper: DVector<f64>,
+    evaluations: Cell<u64>,
+    cache: RefCell<Option<(DVector<f64>, DMatrix<f64>)>>,
+    samples: f64,
+}
+
+impl<'a> Problem<'a> {
+    fn new(
+        model: &'a Model,
+        runs: &'a [Run],
+        progress: &'a (dyn Fn(u64, f64) + Sync),
+    ) -> Result<Self, FitError> {
+        let free: Vec<usize> = (0..model.parameters.len())
+            .filter(|i| model.parameters[*i].free)
+            .collect();
+        let mut tallies = vec![Tally::default(); model.measured.len()];
+        let mut samples = 0.0;
+        for run in runs {
+            for k in 0..run.len() {
+                for (tally, y) in tallies.iter_mut().zip(run.sample(k)) {
+                    tally.add(*y, *y);
+                    samples += f64::from(u8::from(y.is_finite()));
+                }
+            }
+        }
+        let weights: Vec<f64> = tallies
+            .iter()
+            .map(|t| {
+                let std = t.std();
+                // A signal that never moves tells nothing.
+                if std > 0.0 {
+                    1.0 / (std * f64::sqrt(samples))
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let visible = visible_states(model, &nominal(model));
+        let mut scales = Vec::new();
+        let mut lower = Vec::new();
+        let mut upper = Vec::new();
+        for &i in &free {
+            let declaration = model.parameters[i].declaration;
+            let scale = declaration
+                .scale
+                .max(model.parameters[i].value.map_or(0.0, f64::abs));
+            let (low, high) = declaration.bounds();
+            scales.push(scale);
+            lower.push(low / scale);
+            upper.push(high / scale);
+        }
+        for _ in runs {
+            for _ in &visible {
+                scales.push(1.0);
+                lower.push(f64::NEG_INFINITY);
+                upper.push(f64::INFINITY);
+            }
+        }
+        Ok(Self {
+            model,
+            runs,
+            progress,
+            free,
+            visible,
+            weights,
+            scales,
+            lower: DVector::from_vec(lower),
+            upper: DVector::from_vec(upper),
+            evaluations: Cell::new(0),
+            cache: RefCell::new(None),
+            samples,
+        })
+    }
+
+    /// The file's values, and those of a regression; whichever runs closer to the data.
+    fn start(&self, settings: &FitSettings) -> Result<DVector<f64>, FitError> {
+        let mut candidates = Vec::new();
+        if self.model.missing_values().is_empty() {
+            candidates.push(self.model.values());
+        }
+        let regressed = batch(self.model, self.runs, settings.scheme);
+        match (regressed, candidates.is_empty()) {
+            (Ok(values), _) => candidates.push(values),
+            (Err(error), true) => return Err(error),
+            (Err(_), false) => {}
+        }
+        let mut best: Option<(f64, DVector<f64>)> = None;
+        for values in candidates {
+            let initial = InitialStates::guess(self.model, &values, self.runs);
+            let mut scaled: Vec<f64> = self
+                .free
+                .iter()
+                .map(|i| self.model.parameters[*i].declaration.nearest(values[*i]))
+                .collect();
+            for x0 in &initial.states {
+                scaled.extend(self.visible.iter().map(|s| x0[*s]));
+            }
+            for (value, scale) in scaled.iter_mut().zip(&self.scales) {
+                *value /= scale;
+            }
+            let scaled = DVector::from_vec(scaled);
+            let cost = self.residual_vector(&scaled).norm_squared();
+            if cost.is_finite() && best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, scaled));
+            }
+        }
+        best.map(|(_, start)| start).ok_or_else(|| {
+            FitError::Solver("the free run diverges from every starting point".to_owned())
+        })
+    }
+
+    /// Parameter values and initial states behind scaled unknowns.
+    fn unpack(&self, scaled: &DVector<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let mut values = nominal(self.model);
+        for (k, i) in self.free.iter().enumerate() {
+            values[*i] = scaled[k] * self.scales[k];
+        }
+        let states = (0..self.runs.len())
+            .map(|run| {
+                let mut x0 = vec![0.0; self.model.n_states()];
+                let first = self.free.len() + run * self.visible.len();
+                for (k, state) in self.visible.iter().enumerate() {
+                    x0[*state] = scaled[first + k] * self.scales[first + k];
+                }
+                x0
+            })
+            .collect();
+        (values, states)
+    }
+
+    fn rows(&self) -> usize {
+        self.runs.iter().map(Run::len).sum::<usize>() * self.model.measured.len()
+    }
+
+    fn weigh(&self, residual: &mut [f64]) {
+        for (i, value) in residual.iter_mut().enumerate() {
+            *value *= self.weights[i % self.weights.len()];
+        }
+    }
+
+    fn residual_vector(&self, scaled: &DVector<f64>) -> DVector<f64> {
+        let (values, states) = self.unpack(scaled);
+        let mut all = Vec::with_capacity(self.rows());
+        for (run, x0) in self.runs.iter().zip(&states) {
+            let mut residual = residuals(&predict(self.model, &values, x0, run), run);
+            self.weigh(residual.as_mut_slice());
+            all.extend_from_slice(residual.as_slice());
+        }
+        DVector::from_vec(all)
+    }
+
+    /// Weighted residuals, and their Jacobian by the scaled unknowns.
+    fn linearise(&self, scaled: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        if let Some((at, jacobian)) = self.cache.borrow().as_ref() {
+            if at == scaled {
+                return (self.residual_vector(scaled), jacobian.clone());
+            }
+        }
+        let (values, states) = self.unpack(scaled);
+        let n_free = self.free.len();
+        let n_visible = self.visible.len();
+        let mut all = DVector::zeros(self.rows());
+        let mut jacobian = DMatrix::zeros(self.rows(), self.scales.len());
+        let mut first_row = 0;
+        for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
+            let s = sensitivities(self.model, &values, x0, run, &self.free, &self.visible);
+            let residual = residuals(&s.predicted, run);
+            for row in 0..residual.len() {
+                let signal = row % self.weights.len();
+                let seen = run.measured[row].is_finite();
+                let weight = if seen { self.weights[signal] } else { 0.0 };
+                all[first_row + row] = residual[row] * weight;
+                for column in 0..n_free + n_visible {
+                    let to = if column < n_free {
+                        column
+                    } else {
+                        column + index * n_visible
+                    };
+                    jacobian[(first_row + row, to)] =
+                        -s.jacobian[(row, column)] * weight * self.scales[to];
+                }
+            }
+            first_row += residual.len();
+        }
+        *self.cache.borrow_mut() = Some((scaled.clone(), jacobian.clone()));
+        (all, jacobian)
+    }
+
+    fn solve(
+        &self,
+        start: &DVector<f64>,
+        max_iterations: u64,
+        iterations: &Cell<u64>,
+    ) -> Result<DVector<f64>, FitError> {
+        let solver = BoundedLevenbergMarquardt::<DVector<f64>, DMatrix<f64>>::new()
+            .with_absolute_scaled_gradient_tolerance(1e-14)
+            .with_tau(1e-6);
+        let result = Executor::from_start(Borrowed(self), solver, start.clone())
+            .max_iter(max_iterations)
+            .with_relative_cost_change_tolerance(1e-13)
+            .with_relative_step_tolerance(1e-11)
+            .run();
+        let result = match result {
+            Ok(result) => result,
+            Err(error) => return Err(FitError::Solver(error.to_string())),
+        };
+        iterations.set(self.evaluations.get());
+        let solution = result.param().clone();
+        let finite = solution.iter().all(|v| v.is_finite());
+        if result.report.termination == TerminationCode::SolverFailed && !finite {
+            return Err(FitError::Solver(
+                "the damping grew without bound".to_owned(),
+            ));
+        }
+        Ok(solution)
+    }
+
+    fn result(&self, solution: &DVector<f64>, iterations: u64) -> Fit {
+        let (values, _) = self.unpack(solution);
+        let (residual, jacobian) = self.linearise(solution);
+        let gram = jacobian.tr_mul(&jacobian);
+        let norms: Vec<f64> = (0..gram.ncols()).map(|i| gram[(i, i)].sqrt()).collect();
+        let quantile = StudentsT::new(0.0, 1.0, (self.samples - norms.len() as f64).max(1.0))
+            .map_or(1.96, |t| t.inverse_cdf(0.975));
+
+        let flatness = Flatness::of(self, &gram, &norms);
+        let blocks = self.blocks(&residual, &jacobian);
+        let inverse = flatness.inverse(&norms);
+        let (covariance, _) =
+            noise::covariance(&blocks, self.model.measured.len(), &inverse, norms.len());
+
+        let mut fitted = self.model.clone();
+        fitted.set_values(&values);
+        let mut parameters = BTreeMap::new();
+        for (index, parameter) in fitted.parameters.iter().enumerate() {
+            let Some(value) = parameter.value else {
+                continue;
+            };
+            let mut estimate = Estimate {
+                value,
+                unit: parameter.unit.clone(),
+                std_error: None,
+                interval95: None,
+                verdict: Verdict::Held,
+            };
+            if let Some(k) = self.free.iter().position(|i| *i == index) {
+                let error = covariance[(k, k)].max(0.0).sqrt() * self.scales[k];
+                let known = error.is_finite() && !flatness.dead[k] && !flatness.flat[k];
+                if known {
+                    estimate.std_error = Some(error);
+                    estimate.interval95 =
+                        Some([value - quantile * error, value + quantile * error]);
+                }
+                let (low, high) = parameter.declaration.bounds();
+                let margin = 1e-4 * parameter.declaration.scale;
+                estimate.verdict = if flatness.dead[k] {
+                    Verdict::Dead
+                } else if flatness.flat[k] {
+                    Verdict::Flat
+                } else if value - low < margin || high - value < margin {
+                    Verdict::AtBound
+                } else if quantile * error > value.abs() {
+                    Verdict::NotPinned
+                } else {
+                    Verdict::Good
+                };
+            }
+            parameters.insert(parameter.name.clone(), estimate);
+        }
+        Fit {
+            comparison: Comparison::empty(),
+            parameters,
+            method: Method::OutputError,
+            nrmse_before: None,
+            nrmse_fit: f64::NAN,
+            iterations,
+            flat: flatness.words,
+            model: fitted,
+            history: Vec::new(),
+        }
+    }
+
+    /// Splits residuals and Jacobian by run and signal, in time order.
+    fn blocks(&self, residual: &DVector<f64>, jacobian: &DMatrix<f64>) -> Vec<Block> {
+        let n_signals = self.weights.len();
+        let mut blocks = Vec::new();
+        let mut first_row = 0;
+        for run in self.runs {
+            for signal in 0..n_signals {
+                let rows: Vec<usize> = (0..run.len())
+                    .map(|k| first_row + k * n_signals + signal)
+                    .collect();
+                blocks.push(Block {
+                    signal,
+                    residual: rows.iter().map(|r| residual[*r]).collect(),
+                    jacobian: jacobian.select_rows(&rows),
+                });
+            }
+            first_row += run.len() * n_signals;
+        }
+        blocks
+    }
+}
+
+/// Directions in which the data say nothing.
+struct Flatness {
+    dead: Vec<bool>,
+    flat: Vec<bool>,
+    words: Vec<String>,
+    vectors: DMatrix<f64>,
+    values: DVector<f64>,
+}
+
+/// A singular value of the column-normalised Jacobian below this: the direction is flat.
+const FLAT: f64 = 1e-6;
+/// A change of a parameter by its scale that moves the weighted outputs by less than this is dead.
+const DEAD: f64 = 1e-9;
+
+impl Flatness {
+    fn of(problem: &Problem<'_>, gram: &DMatrix<f64>, norms: &[f64]) -> Self {
+        let n = norms.len();
+        let dead: Vec<bool> = norms.iter().map(|norm| !(*norm > DEAD)).collect();
+        let mut normalised = gram.clone();
+        for i in 0..n {
+            for j in 0..n {
+                normalised[(i, j)] = if dead[i] || dead[j] {
+                    f64::from(u8::from(i == j))
+                } else {
+                    gram[(i, j)] / (norms[i] * norms[j])
+                };
+            }
+        }
+        let eigen = normalised.symmetric_eigen();
+        let mut flat = vec![false; n];
+        let mut words = Vec::new();
+        for (k, value) in eigen.eigenvalues.iter().enumerate() {
+            // Eigenvalues are squares of singular values.
+            if *value > FLAT * FLAT {
+                continue;
+            }
+            let mut terms = Vec::new();
+            for (i, index) in problem.free.iter().enumerate() {
+                let share = eigen.eigenvectors[(i, k)];
+                if share.abs() > 0.1 {
+                    flat[i] = true;
+                    let change = share / norms[i] * problem.scales[i];
+                    terms.push((index, change));
+                }
+            }
+            let largest = terms.iter().fold(0.0f64, |a, (_, c)| a.max(c.abs()));
+            let text: Vec<String> = terms
+                .iter()
+                .map(|(index, change)| {
+                    format!(
+                        "{:+.3} {}",
+                        change / largest,
+                        problem.model.parameters[**index].name
+                    )
+                })
+                .collect();
+            if !text.is_empty() {
+                words.push(format!("moving along {} changes nothing", text.join(" ")));
+            }
+        }
+        Self {
+            dead,
+            flat,
+            words,
+            vectors: eigen.eigenvectors,
+            values: eigen.eigenvalues,
+        }
+    }
+
+    /// `(JᵀJ)⁻¹` without the flat directions.
+    fn inverse(&self, norms: &[f64]) -> DMatrix<f64> {
+        let n = norms.len();
+        let mut inverse = DMatrix::zeros(n, n);
+        for (k, value) in self.values.iter().enumerate() {
+            if *value > FLAT * FLAT {
+                let v = self.vectors.column(k);
+                inverse += v * v.transpose() / *value;
+            }
+        }
+        for i in 0..n {
+            for j in 0..n {
+                inverse[(i, j)] = if self.dead[i] || self.dead[j] {
+                    0.0
+                } else {
+                    inverse[(i, j)] / (norms[i] * norms[j])
+                };
+            }
+        }
+        inverse
+    }
+}
+
+/// The file's values, defaults where it is silent, zero where there is neither.
+fn nominal(model: &Model) -> Vec<f64> {
+    model
+        .parameters
+        .iter()
+        .map(|p| p.value.unwrap_or(0.0))
+        .collect()
+}
+
+/// The problem as the solver sees it.
+struct Borrowed<'p, 'a>(&'p Problem<'a>);
+
+impl Residual for Borrowed<'_, '_> {
+    type Param = DVector<f64>;
+    type Output = DVector<f64>;
+    type Error = Infallible;
+    fn residual(&self, scaled: &DVector<f64>) -> Result<DVector<f64>, Infallible> {
+        Ok(self.0.residual_vector(scaled))
+    }
+}
+
+impl Jacobian for Borrowed<'_, '_> {
+    type Jacobian = DMatrix<f64>;
+    fn jacobian(&self, scaled: &DVector<f64>) -> Result<DMatrix<f64>, Infallible> {
+        let (residual, jacobian) = self.0.linearise(scaled);
+        self.0.evaluations.set(self.0.evaluations.get() + 1);
+        (self.0.progress)(self.0.evaluations.get(), residual.norm());
+        Ok(jacobian)
+    }
+}
+
+impl Constraints for Borrowed<'_, '_> {
+    type Set = ConstraintSet<BoxBounds<DVector<f64>>>;
+    fn constraints(&self) -> <Self::Set as ConstraintDescription>::Borrowed<'_> {
+        ConstraintSet::new().with_bounds(BoxBounds::new(Some(&self.0.lower), Some(&self.0.upper)))
+    }
+}

@@ -1,0 +1,211 @@
+//! Simulated outputs with exact derivatives, initial states, and the one-step prediction.
+
+use loopsight_core::model::{Model, pseudo_inverse};
+use loopsight_core::run::Run;
+use loopsight_core::simulate::{Simulator, free_run};
+use loopsight_core::{DUAL_WIDTH, Dual, Real, derivative, variable};
+use nalgebra::{DMatrix, DVector};
+
+/// Plant states of which a measured signal is a direct function: those an initial state can be
+/// estimated for from the first samples. The others start at zero.
+pub(crate) fn visible_states(model: &Model, values: &[f64]) -> Vec<usize> {
+    let (jacobian, _) = model.measurement_jacobian(values, &vec![0.0; model.n_states()]);
+    (0..model.n_states())
+        .filter(|i| jacobian.column(*i).iter().any(|v| *v != 0.0))
+        .collect()
+}
+
+/// The free run over `run` and its derivatives by some parameters and initial states.
+pub(crate) struct Sensitivities {
+    /// Predictions, row by row: sample by sample, signal by signal.
+    pub(crate) predicted: Vec<f64>,
+    /// One row per prediction; first the `parameters`, then the `states`.
+    pub(crate) jacobian: DMatrix<f64>,
+}
+
+/// Simulates `run` from `x0`, differentiated by the parameters and initial states that are listed
+/// (forward mode, [`DUAL_WIDTH`] at a time).
+pub(crate) fn sensitivities(
+    model: &Model,
+    values: &[f64],
+    x0: &[f64],
+    run: &Run,
+    parameters: &[usize],
+    states: &[usize],
+) -> Sensitivities {
+    let columns = parameters.len() + states.len();
+    let rows = run.len() * model.measured.len();
+    let mut predicted = vec![0.0; rows];
+    let mut jacobian = DMatrix::zeros(rows, columns);
+    for first in (0..columns.max(1)).step_by(DUAL_WIDTH) {
+        let last = (first + DUAL_WIDTH).min(columns);
+        let seed = |value: f64, place: Option<usize>| match place {
+            Some(column) if (first..last).contains(&column) => variable(value, column - first),
+            _ => Dual::of(value),
+        };
+        let dual_values: Vec<Dual> = values
+            .iter()
+            .enumerate()
+            .map(|(i, v)| seed(*v, parameters.iter().position(|p| *p == i)))
+            .collect();
+        let dual_x0: Vec<Dual> = x0
+            .iter()
+            .enumerate()
+            .map(|(i, v)| {
+                seed(
+                    *v,
+                    states
+                        .iter()
+                        .position(|s| *s == i)
+                        .map(|k| parameters.len() + k),
+                )
+            })
+            .collect();
+        let mut simulator = Simulator::new(model, &dual_values);
+        free_run(&mut simulator, &dual_x0, run, |k, outputs| {
+            for (i, output) in outputs.iter().enumerate() {
+                let row = k * outputs.len() + i;
+                predicted[row] = output.value();
+                for column in first..last {
+                    jacobian[(row, column)] = derivative(output, column - first);
+                }
+            }
+        });
+    }
+    Sensitivities {
+        predicted,
+        jacobian,
+    }
+}
+
+/// The free run over `run`, without derivatives; row by row as in [`Sensitivities::predicted`].
+pub(crate) fn predict(model: &Model, values: &[f64], x0: &[f64], run: &Run) -> Vec<f64> {
+    let mut predicted = Vec::with_capacity(run.len() * model.measured.len());
+    let mut simulator = Simulator::new(model, values);
+    free_run(&mut simulator, x0, run, |_, outputs| {
+        predicted.extend_from_slice(outputs)
+    });
+    predicted
+}
+
+/// Estimated initial plant states, one per run.
+pub(crate) struct InitialStates {
+    pub(crate) states: Vec<DVector<f64>>,
+}
+
+impl InitialStates {
+    /// From the first sample of each run alone.
+    pub(crate) fn guess(model: &Model, values: &[f64], runs: &[Run]) -> Self {
+        let states = runs
+            .iter()
+            .map(|run| {
+                if run.is_empty() {
+                    DVector::zeros(model.n_states())
+                } else {
+                    DVector::from_vec(model.state_from(values, run.sample(0)))
+                }
+            })
+            .collect();
+        Self { states }
+    }
+
+    /// Those that make the free-run error least, by Gauss–Newton from [`InitialStates::guess`].
+    ///
+    /// Only the beginning of a run tells anything about its initial state; two steps are exact to
+    /// rounding where the plant is linear, and a step is taken only if it lowers the error.
+    pub(crate) fn estimate(model: &Model, values: &[f64], runs: &[Run]) -> Self {
+        let mut initial = Self::guess(model, values, runs);
+        let visible = visible_states(model, values);
+        for (run, x0) in runs.iter().zip(&mut initial.states) {
+            if run.len() < 2 {
+                continue;
+            }
+            let cost = |x: &DVector<f64>| squares(&predict(model, values, x.as_slice(), run), run);
+            let mut best = cost(x0);
+            for _ in 0..3 {
+                let s = sensitivities(model, values, x0.as_slice(), run, &[], &visible);
+                let residual = residuals(&s.predicted, run);
+                let Some(step) = least_squares(&s.jacobian, &residual) else {
+                    break;
+                };
+                let mut candidate = x0.clone();
+                for (k, state) in visible.iter().enumerate() {
+                    candidate[*state] += step[k];
+                }
+                let after = cost(&candidate);
+                if !(after < best) {
+                    break;
+                }
+                let done = best - after <= 1e-12 * best;
+                best = after;
+                *x0 = candidate;
+                if done {
+                    break;
+                }
+            }
+        }
+        initial
+    }
+}
+
+/// `y - ŷ`, zero where the measurement is missing.
+pub(crate) fn residuals(predicted: &[f64], run: &Run) -> DVector<f64> {
+    DVector::from_iterator(
+        predicted.len(),
+        run.measured
+            .iter()
+            .zip(predicted)
+            .map(|(y, p)| if y.is_finite() { y - p } else { 0.0 }),
+    )
+}
+
+fn squares(predicted: &[f64], run: &Run) -> f64 {
+    residuals(predicted, run).norm_squared()
+}
+
+fn least_squares(jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Option<DVector<f64>> {
+    let gram = jacobian.tr_mul(jacobian);
+    Some(pseudo_inverse(&gram)? * jacobian.tr_mul(residual))
+}
+
+/// Predicts each sample from the one before: the plant state of the free run is corrected by what
+/// was measured, then simulated on for one sampling interval.
+///
+/// The correction is `x + H⁺ (y - ŷ)` with `H` the sensitivity of the measured signals to the
+/// state: for a sensor that reads the state itself, the corrected state is the measurement. Effects
+/// keep their states and memories.
+pub(crate) fn one_step(
+    model: &Model,
+    values: &[f64],
+    run: &Run,
+    x0: &[f64],
+    mut each: impl FnMut(usize, &[f64]),
+) {
+    if run.len() < 2 {
+        return;
+    }
+    let (jacobian, _) = model.measurement_jacobian(values, x0);
+    let Some(inverse) = pseudo_inverse(&jacobian) else {
+        return;
+    };
+    let mut free = Simulator::new(model, values);
+    let mut outputs = vec![0.0; model.measured.len()];
+    let mut innovation = DVector::zeros(model.measured.len());
+    free.reset(x0, run.input(0));
+    let mut next = free.clone();
+    for k in 1..run.len() {
+        free.measure(&mut outputs);
+        for (i, (y, p)) in run.sample(k - 1).iter().zip(&outputs).enumerate() {
+            innovation[i] = if y.is_finite() { y - p } else { 0.0 };
+        }
+        next.clone_from(&free);
+        let correction = &inverse * &innovation;
+        for (x, c) in next.state_mut().iter_mut().zip(correction.iter()) {
+            *x += c;
+        }
+        next.advance(run.time[k], run.input(k - 1));
+        next.measure(&mut outputs);
+        each(k, &outputs);
+        free.advance(run.time[k], run.input(k - 1));
+    }
+}

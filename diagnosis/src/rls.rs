@@ -1,0 +1,143 @@
+//! Recursive least squares over a recording: the paper's identification.
+
+use std::collections::BTreeMap;
+
+use loopsight_core::Estimator;
+use loopsight_core::model::Model;
+use loopsight_core::registry::EstimatorPart;
+use loopsight_core::run::Run;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use crate::compare::Comparison;
+use crate::fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
+use crate::regression::{Regression, for_each_row};
+
+/// Samples of the estimate's history that are kept for pictures.
+const HISTORY: usize = 2000;
+
+/// Runs the estimator `rls`, one per controlled state, over all samples in order.
+///
+/// Standard errors are those of least squares with white residuals, `σ² P`; where the regressors
+/// themselves are noisy (encoder counts) the estimate is biased and the interval does not know.
+pub(crate) fn fit(
+    model: &Model,
+    runs: &[Run],
+    settings: &FitSettings,
+    progress: &(dyn Fn(u64, f64) + Sync),
+) -> Result<Fit, FitError> {
+    let mut regression = Regression::new(model, settings.scheme)?;
+    let mut estimators = Vec::new();
+    for row in 0..regression.len() {
+        estimators.push(estimator(regression.parameters(row).len())?);
+    }
+    let total: usize = runs.iter().map(Run::len).sum();
+    let every = (total / HISTORY).max(1);
+    let mut history: Vec<(String, Vec<(f64, f64)>)> = Vec::new();
+    for row in 0..regression.len() {
+        for j in regression.parameters(row) {
+            history.push((model.parameters[*j].name.clone(), Vec::new()));
+        }
+    }
+    let mut sums = vec![(0.0, 0.0); estimators.len()];
+    let mut samples = 0u64;
+    let offsets: Vec<usize> = (0..regression.len())
+        .scan(0, |sum, row| {
+            let first = *sum;
+            *sum += regression.parameters(row).len();
+            Some(first)
+        })
+        .collect();
+    for_each_row(&mut regression, runs, |row, time, phi, y| {
+        let innovation = estimators[row].update(phi, y);
+        if !innovation.accepted {
+            return;
+        }
+        // A-priori error over its relative variance: the residual sum of squares of the whole
+        // regression, recursively (Åström, Wittenmark 2008, section 2.2).
+        sums[row].0 += innovation.innovation.powi(2) / innovation.relative_variance;
+        sums[row].1 += 1.0;
+        if row == 0 {
+            samples += 1;
+            if samples.is_multiple_of(256) {
+                progress(samples, samples as f64 / total as f64);
+            }
+        }
+        if samples.is_multiple_of(every as u64) {
+            for (k, theta) in estimators[row].theta().iter().enumerate() {
+                history[offsets[row] + k].1.push((time, *theta));
+            }
+        }
+    });
+
+    let mut values: Vec<f64> = model.values();
+    let mut parameters = BTreeMap::new();
+    let mut found = BTreeMap::new();
+    for (row, estimator) in estimators.iter().enumerate() {
+        let n = estimator.theta().len();
+        let dof = (sums[row].1 - n as f64).max(1.0);
+        let variance = sums[row].0 / dof;
+        let quantile = StudentsT::new(0.0, 1.0, dof).map_or(1.96, |t| t.inverse_cdf(0.975));
+        for (k, j) in regression.parameters(row).iter().enumerate() {
+            let theta = estimator.theta()[k];
+            let error = (variance * estimator.covariance()[k * n + k])
+                .max(0.0)
+                .sqrt();
+            values[*j] = theta;
+            found.insert(*j, (theta, error, quantile));
+        }
+    }
+    for (index, parameter) in model.parameters.iter().enumerate() {
+        let estimate = match found.get(&index) {
+            Some(&(value, error, quantile)) => Estimate {
+                value,
+                unit: parameter.unit.clone(),
+                std_error: Some(error),
+                interval95: Some([value - quantile * error, value + quantile * error]),
+                verdict: if !parameter.declaration.admits(value) {
+                    Verdict::AtBound
+                } else if quantile * error > value.abs() {
+                    Verdict::NotPinned
+                } else {
+                    Verdict::Good
+                },
+            },
+            None => Estimate {
+                value: parameter.value.unwrap_or(0.0),
+                unit: parameter.unit.clone(),
+                std_error: None,
+                interval95: None,
+                verdict: if parameter.free {
+                    Verdict::Dead
+                } else {
+                    Verdict::Held
+                },
+            },
+        };
+        if !values[index].is_finite() {
+            values[index] = estimate.value;
+        }
+        parameters.insert(parameter.name.clone(), estimate);
+    }
+    let mut fitted = model.clone();
+    fitted.set_values(&values);
+    Ok(Fit {
+        comparison: Comparison::empty(),
+        parameters,
+        method: Method::Rls,
+        nrmse_before: None,
+        nrmse_fit: f64::NAN,
+        iterations: samples,
+        flat: Vec::new(),
+        model: fitted,
+        history,
+    })
+}
+
+/// An `rls` with `n` parameters, starting from zero, by way of the registry.
+fn estimator(n: usize) -> Result<Box<dyn Estimator<f64>>, FitError> {
+    let source = "rls = { initial_covariance = 1e9 }";
+    let part: Box<dyn EstimatorPart> = loopsight_core::config::Source::parse("rls", source)
+        .and_then(|s| s.read())
+        .map_err(|_| FitError::NoEstimator("rls".to_owned()))?;
+    Ok(part.build(&vec![0.0; n])?)
+}
