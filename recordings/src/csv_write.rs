@@ -1,0 +1,350 @@
+//! CSV out: whole tables at once, and live logs row by row.
+//!
+//! Numbers are written in the shortest form that reads back to the same bits; NaN, the missing
+//! value, as an empty field. Nobody ever sees half a file under the final name.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use loopsight_core::Signal;
+use loopsight_core::unit::parse;
+
+use crate::error::RecordingError;
+
+/// The column of a signal: `linear_velocity` in `m/s` is `linear_velocity_m_per_s`.
+///
+/// ```
+/// use loopsight_core::Signal;
+/// use loopsight_recordings::header;
+/// let gain = Signal::new("gain", "k", "V s/m", "A gain.");
+/// assert_eq!(header(&gain), "gain_V_s_per_m");
+/// assert_eq!(header(&Signal::new("duty", "d", "1", "Duty.")), "duty");
+/// ```
+pub fn header(signal: &Signal) -> String {
+    let unit = signal.unit.trim();
+    if matches!(unit, "" | "1") {
+        return signal.id.to_owned();
+    }
+    let mut text = format!("{}_", signal.id);
+    for c in unit
+        .strip_prefix("1/")
+        .map_or(unit.into(), |rest| format!("/{rest}"))
+        .chars()
+    {
+        match c {
+            '/' if text.ends_with('_') => text.push_str("per_"),
+            '/' => text.push_str("_per_"),
+            ' ' | '*' | '·' | '⋅' | '.' if !text.ends_with('_') => text.push('_'),
+            '²' => text.push('2'),
+            '³' => text.push('3'),
+            ' ' | '^' | '(' | ')' => {}
+            c => text.push(c),
+        }
+    }
+    // `V/m s` is V·s/m, but everything behind `per` divides: such a unit keeps its own spelling.
+    let ending = text.get(signal.id.len() + 1..).map(parse);
+    if ending == Some(parse(unit)) {
+        text
+    } else {
+        format!("{}_{unit}", signal.id)
+    }
+}
+
+/// Writes a table, `rows` row by row, so that the file appears complete or not at all.
+///
+/// # Errors
+///
+/// [`RecordingError::Io`], and [`RecordingError::RowWidth`] when `rows` is no whole number of rows.
+pub fn write_csv(path: &Path, headers: &[String], rows: &[f64]) -> Result<(), RecordingError> {
+    if headers.is_empty() || !rows.len().is_multiple_of(headers.len()) {
+        return Err(RecordingError::RowWidth {
+            path: path.to_owned(),
+            expected: headers.len(),
+            found: rows.len().checked_rem(headers.len()).unwrap_or(rows.len()),
+        });
+    }
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".loopsight-").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        // As any other new file, not readable by its owner alone.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let file = builder
+        .tempfile_in(folder)
+        .map_err(|e| io(path, "create a file beside", &e))?;
+    let mut out = BufWriter::new(file);
+    let written = write_header(&mut out, headers).and_then(|()| {
+        rows.chunks_exact(headers.len())
+            .try_for_each(|row| write_row(&mut out, row))
+    });
+    written
+        .and_then(|()| out.flush())
+        .map_err(|e| io(path, "write", &e))?;
+    let file = out.into_inner().map_err(|e| io(path, "write", e.error()))?;
+    file.persist(path)
+        .map_err(|e| io(path, "write", &e.error))?;
+    Ok(())
+}
+
+fn io(path: &Path, action: &'static str, error: &std::io::Error) -> RecordingError {
+    RecordingError::Io {
+        path: path.to_owned(),
+        action,
+        message: error.to_string().into(),
+    }
+}
+
+fn write_header(out: &mut impl Write, headers: &[String]) -> std::io::Result<()> {
+    for (at, header) in headers.iter().enumerate() {
+        let separator = if at == 0 { "" } else { "," };
+        if header.contains(['"', ',', '\n', '\r', '#']) || header.is_empty() {
+            write!(out, "{separator}\"{}\"", header.replace('"', "\"\""))?;
+        } else {
+            write!(out, "{separator}{header}")?;
+        }
+    }
+    writeln!(out)
+}
+
+fn write_row(out: &mut impl Write, row: &[f64]) -> std::io::Result<()> {
+    for (at, value) in row.iter().enumerate() {
+        let separator = if at == 0 { "" } else { "," };
+        match value.is_nan() {
+            // One empty field alone would be a blank line.
+            true if row.len() == 1 => write!(out, "nan")?,
+            true => write!(out, "{separator}")?,
+            false => write!(out, "{separator}{value}")?,
+        }
+    }
+    writeln!(out)
+}
+
+/// Log time between flushes, s: what a killed run loses at most.
+const FLUSH_PERIOD: f64 = 1.0;
+
+/// Writes a log while it is made.
+///
+/// Rows go to `NAME.part` beside the target (`NAME.2.part` and so on when an earlier run left
+/// its own there). [`LogWriter::finish`] gives the file its name; dropped before that, the part
+/// stays and can be read.
+#[derive(Debug)]
+pub struct LogWriter {
+    target: PathBuf,
+    part: PathBuf,
+    out: BufWriter<File>,
+    columns: usize,
+    flushed: Option<f64>,
+}
+
+impl LogWriter {
+    /// Creates the part file and writes the header; the first column is the time in seconds.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Io`] when the file cannot be created.
+    pub fn create(path: &Path, headers: &[String]) -> Result<Self, RecordingError> {
+        let (part, file) = new_part(path)?;
+        let mut out = BufWriter::new(file);
+        write_header(&mut out, headers)
+            .and_then(|()| out.flush())
+            .map_err(|e| io(&part, "write", &e))?;
+        Ok(Self {
+            target: path.to_owned(),
+            part,
+            out,
+            columns: headers.len(),
+            flushed: None,
+        })
+    }
+
+    /// Where the rows are until the log is finished.
+    pub fn part_path(&self) -> &Path {
+        &self.part
+    }
+
+    /// Appends a row; the first value is the time in seconds.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::RowWidth`] or [`RecordingError::Io`].
+    pub fn write(&mut self, row: &[f64]) -> Result<(), RecordingError> {
+        if row.len() != self.columns {
+            return Err(RecordingError::RowWidth {
+                path: self.target.clone(),
+                expected: self.columns,
+                found: row.len(),
+            });
+        }
+        write_row(&mut self.out, row).map_err(|e| io(&self.part, "write", &e))?;
+        let time = row.first().copied().unwrap_or(f64::NAN);
+        match self.flushed {
+            None => self.flushed = Some(time),
+            // Written so that a NaN or a clock set back flushes, too.
+            Some(last) if (0.0..FLUSH_PERIOD).contains(&(time - last)) => {}
+            Some(_) => {
+                self.flushed = Some(time);
+                self.out.flush().map_err(|e| io(&self.part, "write", &e))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what is left and gives the file its name; returns it.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Io`]; the part file then remains.
+    pub fn finish(mut self) -> Result<PathBuf, RecordingError> {
+        self.out
+            .flush()
+            .and_then(|()| self.out.get_ref().sync_all())
+            .map_err(|e| io(&self.part, "write", &e))?;
+        std::fs::rename(&self.part, &self.target)
+            .map_err(|e| io(&self.target, "rename the finished log to", &e))?;
+        Ok(self.target.clone())
+    }
+}
+
+/// How many abandoned parts may lie beside a log.
+const MAX_PARTS: usize = 1000;
+
+fn new_part(path: &Path) -> Result<(PathBuf, File), RecordingError> {
+    let mut number = 1;
+    loop {
+        let mut name = path.as_os_str().to_owned();
+        name.push(if number == 1 {
+            ".part".to_owned()
+        } else {
+            format!(".{number}.part")
+        });
+        let part = PathBuf::from(name);
+        match File::create_new(&part) {
+            Ok(file) => return Ok((part, file)),
+            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && number < MAX_PARTS => {
+                number += 1;
+            }
+            Err(e) => return Err(io(&part, "create", &e)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use loopsight_core::unit::split_name;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{read_csv_from, source};
+
+    fn names(names: &[&str]) -> Vec<String> {
+        names.iter().map(|n| (*n).to_owned()).collect()
+    }
+
+    #[test]
+    fn headers_read_back_to_the_unit() {
+        for unit in [
+            "m/s",
+            "rad/s^2",
+            "V s/m",
+            "1/s",
+            "N m s/rad",
+            "kg m²",
+            "V·s²/m",
+            "%",
+            "V/m s",
+        ] {
+            let text = header(&Signal::new("some_signal", "x", unit, "A signal."));
+            let (name, ending) = split_name(&text);
+            assert_eq!(name, "some_signal", "{text}");
+            assert_eq!(parse(ending.unwrap()), parse(unit), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_log_appears_when_it_is_finished() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        let mut log = LogWriter::create(&path, &names(&["time_s", "u_V"])).unwrap();
+        for k in 0..250 {
+            log.write(&[f64::from(k) * 0.01, 1.0]).unwrap();
+        }
+        assert!(!path.exists());
+        let text = std::fs::read_to_string(log.part_path()).unwrap();
+        let last: f64 = text
+            .lines()
+            .last()
+            .unwrap()
+            .split(',')
+            .next()
+            .unwrap()
+            .parse()
+            .unwrap();
+        assert!(last >= 2.49 - FLUSH_PERIOD, "{last}");
+        let wrong = log.write(&[1.0]).unwrap_err().to_string();
+        assert!(
+            wrong.ends_with("a row has 1 values, the header has 2 columns"),
+            "{wrong}"
+        );
+        let part = log.part_path().to_owned();
+        assert_eq!(log.finish().unwrap(), path);
+        assert!(!part.exists());
+        let source::Source::Table(table) = crate::read(&path).unwrap() else {
+            panic!("a table")
+        };
+        assert_eq!(table.runs[0].rows.len(), 500);
+    }
+
+    #[test]
+    fn a_killed_run_leaves_its_part_and_the_next_one_spares_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        for (run, name) in ["run.csv.part", "run.csv.2.part"].iter().enumerate() {
+            let mut log = LogWriter::create(&path, &names(&["time_s"])).unwrap();
+            log.write(&[run as f64]).unwrap();
+            drop(log);
+            let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
+            assert_eq!(text, format!("time_s\n{run}\n"));
+        }
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_table_is_written_whole_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        write_csv(&path, &names(&["t_s", "a, b"]), &[0.0, f64::NAN]).unwrap();
+        assert_eq!(
+            std::fs::read_to_string(&path).unwrap(),
+            "t_s,\"a, b\"\n0,\n"
+        );
+        assert!(write_csv(&path, &names(&["t_s", "b"]), &[0.0]).is_err());
+        let nowhere = folder.path().join("no/t.csv");
+        assert!(write_csv(&nowhere, &names(&["t_s"]), &[0.0]).is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn numbers_round_trip_exactly(
+            rows in prop::collection::vec(prop::array::uniform2(any::<f64>()), 1..20)
+        ) {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("t.csv");
+            let flat: Vec<f64> = rows.iter().flatten().copied().collect();
+            write_csv(&path, &names(&["t_s", "x"]), &flat).unwrap();
+            let table = read_csv_from(File::open(&path).unwrap(), "t").unwrap();
+            prop_assert_eq!(flat.len(), table.runs[0].rows.len());
+            for (a, b) in flat.iter().zip(&table.runs[0].rows) {
+                prop_assert!(a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()));
+            }
+        }
+    }
+}

@@ -1,0 +1,416 @@
+//! What can be wrong with a file, said with place, expectation and finding.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use loopsight_core::unit::{Dimension, UnitError};
+
+/// Where in a log a value stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Location {
+    /// Line of the file, from 1, where the format has lines.
+    pub line: Option<usize>,
+    /// Run, where they have names.
+    pub run: String,
+    /// Row within the run, from 1.
+    pub row: usize,
+    /// Header of the column.
+    pub column: String,
+    /// Number of the column, from 1.
+    pub column_number: usize,
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.line, self.run.as_str()) {
+            (Some(line), _) => write!(f, "line {line}")?,
+            (None, "") => write!(f, "row {}", self.row)?,
+            (None, run) => write!(f, "run `{run}`, row {}", self.row)?,
+        }
+        write!(f, ", column {} (`{}`)", self.column_number, self.column)
+    }
+}
+
+/// Why a log cannot be read, mapped or written.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RecordingError {
+    /// The operating system refused.
+    #[error("{}: cannot {action}: {message}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// What the system said.
+        message: Box<str>,
+    },
+    /// A folder where a file is expected.
+    #[error("{}: this is a folder; a log is a CSV file or a SysId JSON file", path.display())]
+    Directory {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// No content at all.
+    #[error("{log}: the file is empty")]
+    Empty {
+        /// The file.
+        log: Box<str>,
+    },
+    /// Zero bytes in it.
+    #[error(
+        "{log}: a binary file (byte {position} is zero); expected CSV or SysId JSON as UTF-8 text"
+    )]
+    Binary {
+        /// The file.
+        log: Box<str>,
+        /// Byte, from 1.
+        position: usize,
+    },
+    /// Not UTF-8.
+    #[error("{log}:{line}:{column}: the text is not UTF-8; save it as UTF-8")]
+    NotUtf8 {
+        /// The file.
+        log: Box<str>,
+        /// Line, from 1.
+        line: usize,
+        /// Byte in the line, from 1.
+        column: usize,
+    },
+    /// Neither CSV nor SysId JSON.
+    #[error(
+        "{log}: unknown format: {found}; expected CSV with a header, or SysId JSON with the keys \"test\" and \"units\""
+    )]
+    UnknownFormat {
+        /// The file.
+        log: Box<str>,
+        /// What is there instead.
+        found: Box<str>,
+    },
+    /// JSON that does not parse.
+    #[error("{log}:{line}:{column}: {}: {message}", if *truncated { "the JSON ends too early (truncated?)" } else { "not valid JSON" })]
+    Json {
+        /// The file.
+        log: Box<str>,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// The file ends in the middle.
+        truncated: bool,
+        /// What the parser said.
+        message: Box<str>,
+    },
+    /// A key of a SysId file is missing.
+    #[error(
+        "{log}: the key \"{key}\" is missing; expected {expected}{}; the keys are {}",
+        did_you_mean(nearest),
+        list(keys)
+    )]
+    SysIdKey {
+        /// The file.
+        log: Box<str>,
+        /// The key.
+        key: &'static str,
+        /// What it should hold.
+        expected: &'static str,
+        /// The nearest key there is.
+        nearest: Option<Box<str>>,
+        /// All keys there are.
+        keys: Box<[String]>,
+    },
+    /// A key of a SysId file holds something else.
+    #[error(
+        "{log}: \"{key}\": expected {expected}, found {found}{}",
+        did_you_mean(nearest)
+    )]
+    SysIdValue {
+        /// The file.
+        log: Box<str>,
+        /// The key.
+        key: Box<str>,
+        /// What it should hold.
+        expected: Box<str>,
+        /// What it holds.
+        found: Box<str>,
+        /// The nearest thing that would do.
+        nearest: Option<Box<str>>,
+    },
+    /// A row of a SysId run is wrong.
+    #[error("{log}: run \"{run}\", row {row}: expected {expected}, found {found}")]
+    SysIdRow {
+        /// The file.
+        log: Box<str>,
+        /// The run.
+        run: Box<str>,
+        /// Row, from 1.
+        row: usize,
+        /// What it should be.
+        expected: Box<str>,
+        /// What it is.
+        found: Box<str>,
+    },
+    /// The first line holds numbers.
+    #[error(
+        "{log}:{line}: no header: the first line holds only numbers (`{text}`); expected names with units, as in `time_s,voltage_V,speed_rad_per_s`"
+    )]
+    NoHeader {
+        /// The file.
+        log: Box<str>,
+        /// Line, from 1.
+        line: usize,
+        /// The line.
+        text: Box<str>,
+    },
+    /// Two columns of one name.
+    #[error("{log}:{line}: columns {first} and {second} are both named `{name}`")]
+    DuplicateColumn {
+        /// The file.
+        log: Box<str>,
+        /// Line of the header.
+        line: usize,
+        /// The name.
+        name: Box<str>,
+        /// Number of the first, from 1.
+        first: usize,
+        /// Number of the second.
+        second: usize,
+    },
+    /// Nothing below the header.
+    #[error("{log}: there is a header but no row of numbers below it")]
+    HeaderOnly {
+        /// The file.
+        log: Box<str>,
+    },
+    /// A row of another length.
+    #[error("{log}:{line}: expected {expected} fields as in the header, found {found}")]
+    FieldCount {
+        /// The file.
+        log: Box<str>,
+        /// Line, from 1.
+        line: usize,
+        /// Fields of the header.
+        expected: usize,
+        /// Fields of the row.
+        found: usize,
+    },
+    /// A field that is no number.
+    #[error("{log}:{line}: column {column} (`{name}`): expected a number, found `{text}`")]
+    NotANumber {
+        /// The file.
+        log: Box<str>,
+        /// Line, from 1.
+        line: usize,
+        /// Number of the column, from 1.
+        column: usize,
+        /// Its header.
+        name: Box<str>,
+        /// The field.
+        text: Box<str>,
+    },
+    /// A time stamp or an input is missing.
+    #[error("{log}: {at}: the value is missing; {role} must have a value in every row")]
+    MissingValue {
+        /// The file.
+        log: Box<str>,
+        /// Where.
+        at: Box<Location>,
+        /// `the time` or `an input`.
+        role: &'static str,
+    },
+    /// A magnitude no control loop has.
+    #[error(
+        "{log}: {at}: the value {value} is absurd: its magnitude is above {limit:e} in SI units"
+    )]
+    AbsurdValue {
+        /// The file.
+        log: Box<str>,
+        /// Where.
+        at: Box<Location>,
+        /// The value, in SI.
+        value: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// No column for something the model needs.
+    #[error(
+        "{log}: no column for {role} `{id}` ({wanted}){}; the columns are {}",
+        did_you_mean(nearest),
+        list(columns)
+    )]
+    MissingColumn {
+        /// The file.
+        log: Box<str>,
+        /// `the time`, `the input`, `the measured signal` or `the run`.
+        role: &'static str,
+        /// Id of the signal.
+        id: Box<str>,
+        /// What was looked for.
+        wanted: Box<str>,
+        /// The nearest column.
+        nearest: Option<Box<str>>,
+        /// All columns.
+        columns: Box<[String]>,
+    },
+    /// The log has no signal of the plant.
+    #[error(
+        "{log}: no column is a signal of the model; the signals are {}; the columns are {}; name one under [log.measured]",
+        list(signals),
+        list(columns)
+    )]
+    NothingMeasured {
+        /// The file.
+        log: Box<str>,
+        /// Signals of the plant.
+        signals: Box<[String]>,
+        /// All columns.
+        columns: Box<[String]>,
+    },
+    /// The map names a signal that the plant does not have.
+    #[error(
+        "[{table}] names `{id}`, which the plant does not have{}; it has {}",
+        did_you_mean(nearest),
+        list(known)
+    )]
+    UnknownSignal {
+        /// `log.inputs` or `log.measured`.
+        table: &'static str,
+        /// The id.
+        id: Box<str>,
+        /// The nearest signal.
+        nearest: Option<Box<str>>,
+        /// All signals.
+        known: Box<[String]>,
+    },
+    /// A unit that is none.
+    #[error("{log}: column `{column}`: `{unit}` is not a unit: at `{}`: {error}", error.piece(unit))]
+    BadUnit {
+        /// The file.
+        log: Box<str>,
+        /// The column, or the signal whose unit it is.
+        column: Box<str>,
+        /// The text.
+        unit: Box<str>,
+        /// What is wrong with it.
+        error: UnitError,
+    },
+    /// A unit that measures something else.
+    #[error(
+        "{log}: column `{column}` is in {unit} ({found}), but `{id}` is in {expected_unit} ({expected}); if the ending of the name is no unit, give `unit = \"{expected_unit}\"` in the model's [log]"
+    )]
+    UnitMismatch {
+        /// The file.
+        log: Box<str>,
+        /// The column.
+        column: Box<str>,
+        /// Its unit.
+        unit: Box<str>,
+        /// Its unit in SI base units.
+        found: Dimension,
+        /// The signal.
+        id: Box<str>,
+        /// Its unit.
+        expected_unit: Box<str>,
+        /// Its unit in SI base units.
+        expected: Dimension,
+    },
+    /// A scale that is no number, or zero.
+    #[error("column `{column}`: the scale {scale} must be a finite number, not 0")]
+    BadScale {
+        /// The column.
+        column: Box<str>,
+        /// The scale.
+        scale: f64,
+    },
+    /// A column of words where numbers are needed.
+    #[error("{log}: {at}: `{id}` needs numbers, found the text `{text}`")]
+    TextColumn {
+        /// The file.
+        log: Box<str>,
+        /// Where.
+        at: Box<Location>,
+        /// Who needs it.
+        id: Box<str>,
+        /// The first text.
+        text: Box<str>,
+    },
+    /// A row handed to a writer does not fit its header.
+    #[error("{}: a row has {found} values, the header has {expected} columns", path.display())]
+    RowWidth {
+        /// The file.
+        path: PathBuf,
+        /// Columns of the header.
+        expected: usize,
+        /// Values of the row.
+        found: usize,
+    },
+}
+
+/// `; did you mean …?`, or nothing.
+fn did_you_mean(nearest: &Option<Box<str>>) -> String {
+    nearest
+        .as_ref()
+        .map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+}
+
+fn list(names: &[String]) -> String {
+    if names.is_empty() {
+        return "none".into();
+    }
+    names
+        .iter()
+        .map(|name| format!("`{name}`"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// Less alike than this, a name is no suggestion.
+const ALIKE: f64 = 0.5;
+
+/// The candidate most like `name`, if any is.
+pub(crate) fn nearest<'c>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'c str>,
+) -> Option<Box<str>> {
+    let name = name.to_lowercase();
+    candidates
+        .into_iter()
+        .map(|c| {
+            (
+                strsim::normalized_damerau_levenshtein(&name, &c.to_lowercase()),
+                c,
+            )
+        })
+        .filter(|(alike, _)| *alike >= ALIKE)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, c)| c.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_name_is_found_or_none() {
+        let names = ["voltage_right_V", "voltage_left_V", "time_s"];
+        assert_eq!(
+            nearest("Voltage_rigth", names).as_deref(),
+            Some("voltage_right_V")
+        );
+        assert_eq!(nearest("heading", names), None);
+    }
+
+    #[test]
+    fn a_location_has_a_line_or_a_row() {
+        let mut at = Location {
+            line: Some(7),
+            run: String::new(),
+            row: 6,
+            column: "u_V".into(),
+            column_number: 2,
+        };
+        assert_eq!(at.to_string(), "line 7, column 2 (`u_V`)");
+        at.line = None;
+        at.run = "slow".into();
+        assert_eq!(at.to_string(), "run `slow`, row 6, column 2 (`u_V`)");
+    }
+}

@@ -1,0 +1,42 @@
+//! Logs in and out: reading CSV and WPILib SysId JSON, mapping columns on the signals of a model,
+//! cutting a log into runs, and naming its faults before anything is fitted to it.
+//!
+//! ```
+//! use loopsight_core::Signal;
+//! use loopsight_core::run::LogMap;
+//! use loopsight_recordings::{Source, map, read_csv_from};
+//!
+//! let text = "time_s,voltage_V,speed_rpm\n0.0,0,0\n0.5,6,30\n1.0,6,60\n1.5,3,30\n";
+//! let table = read_csv_from(text.as_bytes(), "motor.csv").unwrap();
+//! let inputs = [Signal::new("voltage", "u", "V", "Voltage of the motor.")];
+//! let outputs = [Signal::new("speed", "w", "rad/s", "Speed of the shaft.")];
+//! let log = map(&Source::Table(table), &inputs, &outputs, &LogMap::default()).unwrap();
+//! assert_eq!(log.runs[0].time, [0.0, 0.5, 1.0, 1.5]);
+//! assert!((log.runs[0].sample(2)[0] - std::f64::consts::TAU).abs() < 1e-12); // 60 rpm
+//! ```
+//!
+//! The order of work is: [`read`] the file as it is ([`Source`]), [`map`] its columns on the
+//! signals of a model in SI units ([`Recording`]), look at [`Recording::faults`] and their
+//! [`Severity`]. [`write_csv`] and [`LogWriter`] write logs that read back to the same numbers.
+
+mod csv_read;
+mod csv_write;
+mod error;
+mod fault;
+mod faults;
+mod map;
+mod model_file;
+mod plan;
+mod segment;
+mod source;
+mod sysid;
+mod table;
+
+pub use csv_read::read_csv_from;
+pub use csv_write::{LogWriter, header, write_csv};
+pub use error::{Location, RecordingError};
+pub use fault::{Fault, FaultKind, Severity};
+pub use map::{MeasuredSignal, Recording, map};
+pub use source::{Source, read};
+pub use sysid::{SysIdLog, SysIdRun, TestKind, read_sysid};
+pub use table::{ColumnName, Table, TableRun};

@@ -1,0 +1,464 @@
+//! From the columns of a file to the signals of a model.
+
+use std::collections::BTreeMap;
+
+use loopsight_core::Signal;
+use loopsight_core::run::{LogMap, Run};
+use loopsight_core::sensor::Sensor;
+
+use crate::error::RecordingError;
+use crate::fault::{Fault, FaultKind};
+use crate::faults;
+use crate::plan::{Link, Plan};
+use crate::segment::{Segments, segment};
+use crate::source::Source;
+use crate::table::{Table, TableRun};
+
+/// Values above this magnitude, in SI units, are no measurements.
+pub(crate) const ABSURD: f64 = 1e9;
+/// Runs shorter than this, s, are left out.
+pub(crate) const SHORT_RUN: f64 = 1.0;
+
+/// Measurements in SI units, in the order of a model's signals, and what is wrong with them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recording {
+    /// File name.
+    pub source: String,
+    /// Uninterrupted runs; the time of each begins at 0.
+    pub runs: Vec<Run>,
+    /// What the columns of [`Run::measured`] are.
+    pub measured: Vec<MeasuredSignal>,
+    /// What is wrong with the log, the worst first.
+    pub faults: Vec<Fault>,
+}
+
+/// A signal of the model for which the log has a column.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeasuredSignal {
+    /// Id of the signal.
+    pub id: String,
+    /// Its SI unit.
+    pub unit: String,
+    /// How the number is made.
+    pub sensor: Sensor,
+}
+
+/// Maps a log on the signals of a model.
+///
+/// `plant_inputs` must all have a column; of `plant_signals` (states and outputs: everything that
+/// can be measured) those are taken that `map` lists, or all that the log has when it lists none.
+/// A column belongs to a signal when the model file says so, or when its header is the signal's
+/// id, or the id, an underscore and a unit.
+///
+/// Each run begins at time 0. Rows that repeat a time stamp are dropped; a jump back by more than
+/// ten periods starts a new run, and so does a gap above `max(10 periods, 0.5 s)`: the parts of a
+/// run `x` are `x`, `x#2`, `x#3`. Runs shorter than 1 s are left out, unless nothing would be
+/// left, or nothing moves in what would be left. All of it is named in [`Recording::faults`].
+///
+/// # Errors
+///
+/// [`RecordingError`] when a column is missing, has a wrong unit, or when a time stamp or an input
+/// has no value that can be used.
+pub fn map(
+    source: &Source,
+    plant_inputs: &[Signal],
+    plant_signals: &[Signal],
+    map: &LogMap,
+) -> Result<Recording, RecordingError> {
+    let table = source.table();
+    let plan = Plan::new(&table, plant_inputs, plant_signals, map)?;
+    let mut mapper = Mapper::new(&table, &plan);
+    for run in &table.runs {
+        mapper.run(run)?;
+    }
+    let (runs, mut found) = mapper.finish()?;
+    let mut recording = Recording {
+        source: table.source.clone(),
+        runs,
+        measured: plan.measured.iter().map(|(_, m)| m.clone()).collect(),
+        faults: Vec::new(),
+    };
+    if let Source::SysId(log) = source {
+        found.extend(log.notes());
+    }
+    found.extend(plan.notes.iter().cloned());
+    let input_ids: Vec<&str> = plan.inputs.iter().map(|(_, id)| id.as_str()).collect();
+    found.extend(faults::check(&recording, &input_ids, &table, &plan));
+    found.sort_by_key(|fault| std::cmp::Reverse(fault.severity()));
+    recording.faults = found;
+    Ok(recording)
+}
+
+/// Fault of a group of runs; the names are joined when they are not all of them.
+pub(crate) fn run_names(names: &[&str], all: usize) -> String {
+    if names.len() == all {
+        return String::new();
+    }
+    let shown = |name: &&str| {
+        if name.is_empty() {
+            "#1".to_owned()
+        } else {
+            (*name).to_owned()
+        }
+    };
+    names.iter().map(shown).collect::<Vec<_>>().join(", ")
+}
+
+/// Occurrences of something in a log: how many, and the first.
+#[derive(Default)]
+struct Tally {
+    count: usize,
+    first: String,
+}
+
+impl Tally {
+    fn add(&mut self, place: impl FnOnce() -> String) {
+        if self.count == 0 {
+            self.first = place();
+        }
+        self.count += 1;
+    }
+}
+
+struct Mapper<'a> {
+    table: &'a Table,
+    plan: &'a Plan,
+    runs: Vec<Run>,
+    names: BTreeMap<String, usize>,
+    rows: usize,
+    duplicates: Tally,
+    backwards: Tally,
+    restarts: Tally,
+    gaps: Tally,
+    longest_gap: f64,
+    missing: Vec<Tally>,
+    absurd: Vec<Tally>,
+    empty: Vec<&'a str>,
+}
+
+impl<'a> Mapper<'a> {
+    fn new(table: &'a Table, plan: &'a Plan) -> Self {
+        let tallies = || plan.measured.iter().map(|_| Tally::default()).collect();
+        Self {
+            table,
+            plan,
+            runs: Vec::new(),
+            names: BTreeMap::new(),
+            rows: 0,
+            duplicates: Tally::default(),
+            backwards: Tally::default(),
+            restarts: Tally::default(),
+            gaps: Tally::default(),
+            longest_gap: 0.0,
+            missing: tallies(),
+            absurd: tallies(),
+            empty: Vec::new(),
+        }
+    }
+
+    fn run(&mut self, run: &'a TableRun) -> Result<(), RecordingError> {
+        if run.rows.is_empty() {
+            self.empty.push(&run.name);
+            return Ok(());
+        }
+        let rows: Vec<&[f64]> = self.table.rows(run).collect();
+        // Runs of equal numbers in the column of the run, or all rows.
+        let number = |row: &&[f64]| self.plan.run.map(|c| row[c].to_bits());
+        let mut start = 0;
+        for group in rows.chunk_by(|a, b| number(a) == number(b)) {
+            let name = match self.plan.run {
+                Some(column) => self.group_name(run, column, group[0][column]),
+                None => run.name.clone(),
+            };
+            self.group(run, &rows, start..start + group.len(), &name)?;
+            start += group.len();
+        }
+        Ok(())
+    }
+
+    fn group_name(&self, run: &TableRun, column: usize, value: f64) -> String {
+        let label = match self.table.labels.get(&column) {
+            Some(words) => words.get(value as usize).cloned().unwrap_or_default(),
+            None => value.to_string(),
+        };
+        if run.name.is_empty() {
+            label
+        } else {
+            format!("{} {label}", run.name)
+        }
+    }
+
+    fn group(
+        &mut self,
+        run: &TableRun,
+        rows: &[&[f64]],
+        range: std::ops::Range<usize>,
+        name: &str,
+    ) -> Result<(), RecordingError> {
+        let time = self.plan.time;
+        // Shifted before scaled: large stamps (microseconds since 1970) keep their digits.
+        let origin = rows.get(range.start).map_or(0.0, |row| row[time.column]);
+        let mut times = Vec::with_capacity(range.len());
+        for at in range {
+            let stamp = rows[at][time.column];
+            self.check(run, at, time, stamp, "the time")?;
+            let shifted = (stamp - origin) * time.factor;
+            self.limit(run, at, time, shifted)?;
+            times.push((at, shifted));
+        }
+        self.rows += times.len();
+        let cut = segment(&times);
+        self.count_cuts(run, rows, &cut);
+        let first_row = times.first().map_or(0, |(at, _)| *at);
+        for part in &cut.parts {
+            let part_name = self.part_name(name);
+            let time_of = |at: &usize| times[at - first_row].1;
+            let start = part.first().map_or(0.0, time_of);
+            let mut out = Run {
+                name: part_name,
+                time: part.iter().map(|at| time_of(at) - start).collect(),
+                n_inputs: self.plan.inputs.len(),
+                n_measured: self.plan.measured.len(),
+                ..Run::default()
+            };
+            for at in part {
+                self.row(run, *at, rows[*at], &mut out)?;
+            }
+            self.runs.push(out);
+        }
+        Ok(())
+    }
+
+    fn part_name(&mut self, name: &str) -> String {
+        let parts = self.names.entry(name.to_owned()).or_insert(0);
+        *parts += 1;
+        if *parts == 1 {
+            name.to_owned()
+        } else {
+            format!("{name}#{parts}")
+        }
+    }
+
+    fn count_cuts(&mut self, run: &TableRun, rows: &[&[f64]], cut: &Segments) {
+        let (table, time) = (self.table, self.plan.time);
+        let place = |row: usize| {
+            let stamp = rows[row][time.column];
+            format!("{}: {stamp}", table.location(run, row, time.column))
+        };
+        for row in &cut.duplicates {
+            self.duplicates.add(|| place(*row));
+        }
+        for row in &cut.backwards {
+            self.backwards.add(|| place(*row));
+        }
+        for row in &cut.restarts {
+            self.restarts.add(|| place(*row));
+        }
+        for (row, length) in &cut.gaps {
+            self.gaps.add(|| place(*row));
+            self.longest_gap = self.longest_gap.max(*length);
+        }
+    }
+
+    fn row(
+        &mut self,
+        run: &TableRun,
+        at: usize,
+        row: &[f64],
+        out: &mut Run,
+    ) -> Result<(), RecordingError> {
+        let plan = self.plan;
+        for (link, _) in &plan.inputs {
+            let value = row[link.column];
+            self.check(run, at, *link, value, "an input")?;
+            self.limit(run, at, *link, value * link.factor)?;
+            out.inputs.push(value * link.factor);
+        }
+        for (signal, (link, _)) in plan.measured.iter().enumerate() {
+            let mut value = row[link.column] * link.factor;
+            let place = || self.table.location(run, at, link.column).to_string();
+            if value.is_nan() {
+                self.missing[signal].add(place);
+            } else if value.abs() > ABSURD {
+                self.absurd[signal].add(|| format!("{}: {value}", place()));
+                value = f64::NAN;
+            }
+            out.measured.push(value);
+        }
+        Ok(())
+    }
+
+    /// Time stamps and inputs must be there.
+    fn check(
+        &self,
+        run: &TableRun,
+        at: usize,
+        link: Link,
+        value: f64,
+        role: &'static str,
+    ) -> Result<(), RecordingError> {
+        if value.is_nan() {
+            return Err(RecordingError::MissingValue {
+                log: self.table.source.as_str().into(),
+                at: Box::new(self.table.location(run, at, link.column)),
+                role,
+            });
+        }
+        Ok(())
+    }
+
+    fn limit(
+        &self,
+        run: &TableRun,
+        at: usize,
+        link: Link,
+        value: f64,
+    ) -> Result<(), RecordingError> {
+        // A NaN here is the difference of two infinite time stamps.
+        if value.is_nan() || value.abs() > ABSURD {
+            return Err(RecordingError::AbsurdValue {
+                log: self.table.source.as_str().into(),
+                at: Box::new(self.table.location(run, at, link.column)),
+                value,
+                limit: ABSURD,
+            });
+        }
+        Ok(())
+    }
+
+    /// The runs to use, and what was done to get them.
+    fn finish(self) -> Result<(Vec<Run>, Vec<Fault>), RecordingError> {
+        if self.runs.is_empty() {
+            return Err(RecordingError::HeaderOnly {
+                log: self.table.source.as_str().into(),
+            });
+        }
+        let mut faults = Vec::new();
+        let time = self
+            .table
+            .columns
+            .get(self.plan.time.column)
+            .map_or("", |c| c.text.as_str());
+        let mut push = |kind, run: String, signal: &str, detail: String| {
+            faults.push(Fault {
+                kind,
+                run,
+                signal: signal.into(),
+                detail,
+            });
+        };
+        let Tally { count, first } = &self.duplicates;
+        if *count > 0 {
+            let detail = format!(
+                "{count} of {} rows repeat the time stamp before and were left out, the first \
+                 at {first}",
+                self.rows
+            );
+            push(FaultKind::DuplicateTime, String::new(), time, detail);
+        }
+        let (back, restarts) = (&self.backwards, &self.restarts);
+        if back.count + restarts.count > 0 {
+            let mut said = Vec::new();
+            if back.count > 0 {
+                said.push(format!(
+                    "the time goes back in {} of {} rows, which were left out, the first at {}",
+                    back.count, self.rows, back.first
+                ));
+            }
+            if restarts.count > 0 {
+                said.push(format!(
+                    "the time jumps back {} times, where a new run was begun, the first at {}",
+                    restarts.count, restarts.first
+                ));
+            }
+            push(
+                FaultKind::NonMonotoneTime,
+                String::new(),
+                time,
+                said.join("; "),
+            );
+        }
+        if self.gaps.count > 0 {
+            let detail = format!(
+                "{} gaps, the longest {:.3} s, where the run was split; the first ends at {}",
+                self.gaps.count, self.longest_gap, self.gaps.first
+            );
+            push(FaultKind::Gap, String::new(), time, detail);
+        }
+        for (at, (_, signal)) in self.plan.measured.iter().enumerate() {
+            let (missing, absurd) = (&self.missing[at], &self.absurd[at]);
+            if missing.count > 0 {
+                let detail = format!(
+                    "{} of {} samples are missing, the first at {}",
+                    missing.count, self.rows, missing.first
+                );
+                push(FaultKind::NotANumber, String::new(), &signal.id, detail);
+            }
+            if absurd.count > 0 {
+                let detail = format!(
+                    "{} of {} samples are above {ABSURD:e} {} in magnitude and count as \
+                     missing, the first at {}",
+                    absurd.count, self.rows, signal.unit, absurd.first
+                );
+                push(FaultKind::AbsurdValue, String::new(), &signal.id, detail);
+            }
+        }
+        if !self.empty.is_empty() {
+            let detail = "no rows; left out".to_owned();
+            push(
+                FaultKind::EmptyRun,
+                run_names(&self.empty, usize::MAX),
+                "",
+                detail,
+            );
+        }
+        let (runs, short) = without_short_runs(self.runs);
+        faults.extend(short);
+        Ok((runs, faults))
+    }
+}
+
+/// Leaves out the short runs where the others are enough.
+fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
+    let is_short = |run: &Run| run.duration() < SHORT_RUN;
+    let list = runs
+        .iter()
+        .filter(|run| is_short(run))
+        .map(|run| format!("`{}` {:.2} s", run.name, run.duration()))
+        .collect::<Vec<_>>();
+    if list.is_empty() {
+        return (runs, None);
+    }
+    let moves = |run: &Run| (0..run.n_measured).any(|s| faults::moves(run, s));
+    let enough = runs.iter().any(|run| !is_short(run) && moves(run));
+    let keep = !enough && runs.iter().any(|run| is_short(run) && moves(run));
+    let names: Vec<&str> = runs
+        .iter()
+        .filter(|run| is_short(run))
+        .map(|run| run.name.as_str())
+        .collect();
+    let (what, all_short) = (list.join(", "), names.len() == runs.len());
+    let shorter = format!("shorter than {SHORT_RUN} s: {what}");
+    let detail = if all_short {
+        format!("every run is {shorter}")
+    } else if keep {
+        format!("{shorter}; kept, since nothing moves in the longer runs")
+    } else {
+        format!("{shorter}; left out")
+    };
+    let fault = Fault {
+        kind: FaultKind::ShortRun,
+        run: run_names(&names, runs.len()),
+        signal: String::new(),
+        detail,
+    };
+    let runs = if all_short || keep {
+        runs
+    } else {
+        runs.into_iter().filter(|run| !is_short(run)).collect()
+    };
+    (runs, Some(fault))
+}
+
+#[cfg(test)]
+mod tests;

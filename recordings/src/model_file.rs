@@ -1,0 +1,165 @@
+//! A model file for a SysId log: what the file says of itself, and nothing a fit should find.
+
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+use crate::sysid::{SysIdLog, TestKind};
+
+/// Half track, m, where the data do not tell it.
+const GUESSED_HALF_TRACK: f64 = 0.3;
+/// Wheel radius, m, where the units are no length: the three inches of most such robots.
+const GUESSED_WHEEL_RADIUS: f64 = 0.0762;
+/// Half tracks, m, outside of which something is wrong with the units.
+const PLAUSIBLE_HALF_TRACK: std::ops::RangeInclusive<f64> = 0.1..=1.0;
+
+impl SysIdLog {
+    /// A commented model file for this log.
+    pub fn model_toml(&self) -> String {
+        // A comment must stay on its line, whatever the file is called.
+        let source: String = self.source.chars().filter(|c| !c.is_control()).collect();
+        let mut text = format!(
+            "# Made from {source}: SysId test \"{}\", {} runs, {} {} per rotation.\n",
+            self.test.name(),
+            self.runs.len(),
+            self.units_per_rotation,
+            self.units
+        );
+        text.push_str("# Parameters that are not given here are what a fit finds.\n\n");
+        if self.test.is_drivetrain() {
+            self.drivetrain(&mut text);
+        } else {
+            self.axis(&mut text);
+        }
+        text
+    }
+
+    fn drivetrain(&self, text: &mut String) {
+        text.push_str("[plant.ddmr]\n");
+        let metres = self.metres_per_rotation();
+        let radius = rounded(metres.map_or(GUESSED_WHEEL_RADIUS, |metres| metres / TAU));
+        match metres {
+            Some(metres) => line(
+                text,
+                &format!("# {metres:.6} m per rotation, divided by 2 pi"),
+            ),
+            None => line(
+                text,
+                "# A guess (3 in): the log counts rotations and not lengths.",
+            ),
+        }
+        line(text, &format!("wheel_radius = {radius:?} # m"));
+        match self.half_track() {
+            Some((half_track, turned)) => {
+                let half_track = half_track.abs();
+                line(
+                    text,
+                    &format!("# From the wheels against the gyro, {turned:.1} rad turned."),
+                );
+                if !PLAUSIBLE_HALF_TRACK.contains(&half_track) {
+                    line(
+                        text,
+                        "# Implausible: look at unitsPerRotation and the gyro's unit.",
+                    );
+                }
+                line(text, &format!("half_track = {half_track:.4} # m"));
+            }
+            None => {
+                line(
+                    text,
+                    "# A guess: the log turns too little to tell. In straight runs it does not matter.",
+                );
+                line(text, &format!("half_track = {GUESSED_HALF_TRACK:?} # m"));
+            }
+        }
+        text.push_str("\n# The inputs are the columns voltage_right_V and voltage_left_V.\n");
+        text.push_str(
+            "# Speeds come from the motor controller; many filter them and report them late:\n\
+             # the effects sensor_delay and sensor_lag say so.\n",
+        );
+        for side in ["right", "left"] {
+            line(text, &format!("[log.measured.track_speed_{side}]"));
+            if metres.is_none() {
+                line(text, &format!("column = \"shaft_speed_{side}_rad_per_s\""));
+                line(text, "unit = \"m/s\"");
+                line(
+                    text,
+                    &format!("scale = {radius:?} # the wheel radius guessed above"),
+                );
+            }
+        }
+    }
+
+    fn axis(&self, text: &mut String) {
+        text.push_str("[plant.dc_axis]\n\n# The input is the column voltage_V.\n");
+        match self.test {
+            TestKind::Arm => line(
+                text,
+                "# An arm is lifted: the effect gravity_pendulum says so.",
+            ),
+            TestKind::Elevator => {
+                line(
+                    text,
+                    "# A lift has weight: the effect constant_force says so.",
+                );
+                line(
+                    text,
+                    "# The speed is that of the shaft; its unit of length does not matter.",
+                );
+            }
+            _ => {}
+        }
+        line(text, "[log.measured.speed]");
+    }
+}
+
+/// To a tenth of a micrometre, for people.
+fn rounded(metres: f64) -> f64 {
+    (metres * 1e7).round() / 1e7
+}
+
+fn line(text: &mut String, content: &str) {
+    // Writing into a String cannot fail.
+    let _ = writeln!(text, "{content}");
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::read_sysid;
+
+    fn model(test: &str, units: &str, row: &str) -> String {
+        let text = format!(
+            r#"{{"test":"{test}","units":"{units}","unitsPerRotation":0.5,"slow-forward":[{row}]}}"#
+        );
+        read_sysid(&text, "a\nlog.json").unwrap().model_toml()
+    }
+
+    #[test]
+    fn a_drivetrain_in_metres() {
+        let text = model("Drivetrain", "Meters", "[0,0,0,0,0,0,0,0,0]");
+        assert!(text.starts_with("# Made from alog.json: SysId test \"Drivetrain\", 1 runs"));
+        assert!(text.contains("\n[plant.ddmr]\n"));
+        assert!(text.contains("wheel_radius = 0.0795775 "));
+        assert!(text.contains("# A guess: the log turns too little"));
+        assert!(text.contains("half_track = 0.3 "));
+        assert!(
+            text.ends_with("[log.measured.track_speed_right]\n[log.measured.track_speed_left]\n")
+        );
+    }
+
+    #[test]
+    fn a_drivetrain_in_rotations_says_that_it_guesses() {
+        let text = model("Drivetrain (Angular)", "Rotations", "[0,0,0,0,0,0,0,0,0]");
+        assert!(text.contains("# A guess (3 in)"));
+        assert!(
+            text.contains(
+                "column = \"shaft_speed_left_rad_per_s\"\nunit = \"m/s\"\nscale = 0.0762"
+            )
+        );
+    }
+
+    #[test]
+    fn an_axis() {
+        let text = model("Elevator", "Meters", "[0,0,0,0]");
+        assert!(text.contains("[plant.dc_axis]\n") && text.ends_with("[log.measured.speed]\n"));
+    }
+}

@@ -1,0 +1,303 @@
+//! Which column is which signal, and the factor that makes it SI.
+
+use loopsight_core::Signal;
+use loopsight_core::run::LogMap;
+use loopsight_core::unit::{Unit, conversion, parse};
+
+use crate::error::{RecordingError, nearest};
+use crate::fault::{Fault, FaultKind};
+use crate::map::MeasuredSignal;
+use crate::table::Table;
+
+/// A column and the factor to the SI unit of its signal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Link {
+    pub(crate) column: usize,
+    pub(crate) factor: f64,
+}
+
+/// Everything a model takes from a log.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Plan {
+    pub(crate) time: Link,
+    pub(crate) run: Option<usize>,
+    pub(crate) inputs: Vec<(Link, String)>,
+    pub(crate) measured: Vec<(Link, MeasuredSignal)>,
+    pub(crate) notes: Vec<Fault>,
+}
+
+/// What the model file says of one signal.
+#[derive(Clone, Copy, Default)]
+struct Wish<'m> {
+    column: Option<&'m str>,
+    unit: Option<&'m str>,
+    scale: Option<f64>,
+}
+
+impl Plan {
+    pub(crate) fn new(
+        table: &Table,
+        inputs: &[Signal],
+        signals: &[Signal],
+        map: &LogMap,
+    ) -> Result<Self, RecordingError> {
+        known("log.inputs", map.inputs.keys(), inputs)?;
+        known("log.measured", map.measured.keys(), signals)?;
+        let mut finder = Finder {
+            table,
+            notes: Vec::new(),
+        };
+        let time = finder.time(map)?;
+        let run = match &map.run {
+            Some(name) => Some(find(table, name).map(|(column, _)| column).ok_or_else(|| {
+                finder.missing("the run", name, format!("a column named `{name}`"), name)
+            })?),
+            None => table.columns.iter().position(|c| c.text == "run"),
+        };
+        let mut input_links = Vec::new();
+        for signal in inputs {
+            let wish = map
+                .inputs
+                .get(signal.id)
+                .map_or_else(Wish::default, |c| Wish {
+                    column: Some(c.name()),
+                    unit: c.unit(),
+                    scale: Some(c.scale()),
+                });
+            let link = finder.signal("the input", signal, wish)?;
+            input_links.push((link, signal.id.to_owned()));
+        }
+        let mut measured = Vec::new();
+        for signal in signals {
+            let entry = map.measured.get(signal.id);
+            let wanted = match entry {
+                Some(_) => true,
+                // Without a list: whatever the log has, but no input twice.
+                None => {
+                    map.measured.is_empty()
+                        && !inputs.iter().any(|input| input.id == signal.id)
+                        && find(table, signal.id).is_some()
+                }
+            };
+            if !wanted {
+                continue;
+            }
+            let wish = entry.map_or_else(Wish::default, |m| Wish {
+                column: m.column.as_deref(),
+                unit: m.unit.as_deref(),
+                scale: m.scale,
+            });
+            let link = finder.signal("the measured signal", signal, wish)?;
+            let measured_signal = MeasuredSignal {
+                id: signal.id.to_owned(),
+                unit: signal.unit.to_owned(),
+                sensor: entry.map(|m| m.sensor.clone()).unwrap_or_default(),
+            };
+            measured.push((link, measured_signal));
+        }
+        if measured.is_empty() {
+            return Err(RecordingError::NothingMeasured {
+                log: table.source.as_str().into(),
+                signals: signals.iter().map(|s| s.id.to_owned()).collect(),
+                columns: table.column_texts().into(),
+            });
+        }
+        Ok(Self {
+            time,
+            run,
+            inputs: input_links,
+            measured,
+            notes: finder.notes,
+        })
+    }
+}
+
+fn known<'m>(
+    table: &'static str,
+    ids: impl Iterator<Item = &'m String>,
+    signals: &[Signal],
+) -> Result<(), RecordingError> {
+    for id in ids {
+        if !signals.iter().any(|s| s.id == id) {
+            return Err(RecordingError::UnknownSignal {
+                table,
+                id: id.as_str().into(),
+                nearest: nearest(id, signals.iter().map(|s| s.id)),
+                known: signals.iter().map(|s| s.id.to_owned()).collect(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The column of this name, with the rest of its header as the unit: the whole header first,
+/// then the name, an underscore and anything that is a unit.
+fn find<'t>(table: &'t Table, name: &str) -> Option<(usize, Option<&'t str>)> {
+    if let Some(at) = table.columns.iter().position(|c| c.text == name) {
+        return Some((at, None));
+    }
+    table.columns.iter().enumerate().find_map(|(at, column)| {
+        let unit = column.text.strip_prefix(name)?.strip_prefix('_')?;
+        parse(unit).is_ok().then_some((at, Some(unit)))
+    })
+}
+
+struct Finder<'t> {
+    table: &'t Table,
+    notes: Vec<Fault>,
+}
+
+impl Finder<'_> {
+    fn missing(&self, role: &'static str, id: &str, wanted: String, like: &str) -> RecordingError {
+        // Compare with names, show headers.
+        let columns = &self.table.columns;
+        let texts = columns.iter().map(|c| c.text.as_str());
+        let by_name = nearest(like, columns.iter().map(|c| c.name.as_str()))
+            .and_then(|name| columns.iter().find(|c| c.name == *name))
+            .map(|c| c.text.as_str().into());
+        RecordingError::MissingColumn {
+            log: self.table.source.as_str().into(),
+            role,
+            id: id.into(),
+            wanted: wanted.into(),
+            nearest: by_name.or_else(|| nearest(like, texts)),
+            columns: self.table.column_texts().into(),
+        }
+    }
+
+    fn signal(
+        &mut self,
+        role: &'static str,
+        signal: &Signal,
+        wish: Wish<'_>,
+    ) -> Result<Link, RecordingError> {
+        let name = wish.column.unwrap_or(signal.id);
+        let (column, ending) = find(self.table, name).ok_or_else(|| {
+            let wanted = match wish.column {
+                Some(name) => format!("the model's [log] says `{name}`"),
+                None => format!("expected `{}`", crate::header(signal)),
+            };
+            self.missing(role, signal.id, wanted, name)
+        })?;
+        let header = self.table.columns.get(column);
+        // A header that is the id itself has no unit to it; one named in the model file may.
+        let split = header
+            .filter(|h| h.text != signal.id)
+            .and_then(|h| h.unit.as_deref());
+        let unit = wish.unit.or(ending).or(split);
+        self.link(
+            column,
+            signal.id,
+            signal.unit,
+            unit,
+            wish.scale.unwrap_or(1.0),
+        )
+    }
+
+    fn time(&mut self, map: &LogMap) -> Result<Link, RecordingError> {
+        let wanted = "a column such as `time_s`".to_owned();
+        if let Some(time) = &map.time {
+            let (column, ending) = find(self.table, time.name())
+                .ok_or_else(|| self.missing("the time", "time", wanted, time.name()))?;
+            let split = self
+                .table
+                .columns
+                .get(column)
+                .and_then(|c| c.unit.as_deref());
+            return self.link(
+                column,
+                "time",
+                "s",
+                time.unit().or(ending).or(split),
+                time.scale(),
+            );
+        }
+        let columns = &self.table.columns;
+        let is_time = |name: &str| name.starts_with("time") || name == "t";
+        let second = parse("s").ok().map(|s| s.dimension);
+        let in_seconds = |unit: &str| parse(unit).ok().map(|u| u.dimension) == second;
+        let with_unit = columns
+            .iter()
+            .position(|c| is_time(&c.name) && c.unit.as_deref().is_some_and(in_seconds));
+        let column = with_unit
+            .or_else(|| {
+                columns
+                    .iter()
+                    .position(|c| is_time(&c.text) && c.unit.is_none())
+            })
+            .ok_or_else(|| self.missing("the time", "time", wanted, "time_s"))?;
+        let unit = columns.get(column).and_then(|c| c.unit.as_deref());
+        self.link(column, "time", "s", unit, 1.0)
+    }
+
+    fn link(
+        &mut self,
+        column: usize,
+        id: &str,
+        si: &str,
+        unit: Option<&str>,
+        scale: f64,
+    ) -> Result<Link, RecordingError> {
+        let header = self
+            .table
+            .columns
+            .get(column)
+            .map_or_else(String::new, |c| c.text.clone());
+        if !scale.is_finite() || scale == 0.0 {
+            return Err(RecordingError::BadScale {
+                column: header.into(),
+                scale,
+            });
+        }
+        if let Some(words) = self.table.labels.get(&column) {
+            let first = self.table.runs.first().cloned().unwrap_or_default();
+            return Err(RecordingError::TextColumn {
+                log: self.table.source.as_str().into(),
+                at: Box::new(self.table.location(&first, 0, column)),
+                id: id.into(),
+                text: words.first().cloned().unwrap_or_default().into(),
+            });
+        }
+        let expected = self.unit(id, si)?;
+        let factor = match unit {
+            Some(text) => {
+                let found = self.unit(&header, text)?;
+                conversion(&found, &expected).ok_or_else(|| RecordingError::UnitMismatch {
+                    log: self.table.source.as_str().into(),
+                    column: header.as_str().into(),
+                    unit: text.into(),
+                    found: found.dimension,
+                    id: id.into(),
+                    expected_unit: si.into(),
+                    expected: expected.dimension,
+                })?
+            }
+            None => {
+                if !expected.dimension.is_one() {
+                    self.notes.push(Fault {
+                        kind: FaultKind::UnitAssumed,
+                        run: String::new(),
+                        signal: id.into(),
+                        detail: format!(
+                            "the column `{header}` does not say its unit; taken as {si}"
+                        ),
+                    });
+                }
+                1.0
+            }
+        };
+        Ok(Link {
+            column,
+            factor: factor * scale,
+        })
+    }
+
+    fn unit(&self, column: &str, unit: &str) -> Result<Unit, RecordingError> {
+        parse(unit).map_err(|error| RecordingError::BadUnit {
+            log: self.table.source.as_str().into(),
+            column: column.into(),
+            unit: unit.into(),
+            error,
+        })
+    }
+}

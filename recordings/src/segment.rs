@@ -1,0 +1,116 @@
+//! Time stamps: which rows can be used, and where one run ends and the next begins.
+
+/// A jump back by more than this many periods is the start of another run, appended to the file.
+pub(crate) const NEW_RUN_PERIODS: f64 = 10.0;
+/// A step of more than this many periods, and of more than [`GAP_TIME`], is a gap.
+pub(crate) const GAP_PERIODS: f64 = 10.0;
+/// See [`GAP_PERIODS`]; s.
+pub(crate) const GAP_TIME: f64 = 0.5;
+
+/// What was done about the time stamps of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Segments {
+    /// Rows to keep, part by part.
+    pub(crate) parts: Vec<Vec<usize>>,
+    /// Rows that repeat the time stamp before.
+    pub(crate) duplicates: Vec<usize>,
+    /// Rows whose time stamp lies before the one before.
+    pub(crate) backwards: Vec<usize>,
+    /// First rows of runs that begin with a jump back.
+    pub(crate) restarts: Vec<usize>,
+    /// Rows behind a gap, and its length, s.
+    pub(crate) gaps: Vec<(usize, f64)>,
+}
+
+/// Cuts the rows of a run where their time stamps, in seconds, jump.
+pub(crate) fn segment(times: &[(usize, f64)]) -> Segments {
+    let mut steps: Vec<f64> = times
+        .windows(2)
+        .map(|w| w[1].1 - w[0].1)
+        .filter(|step| *step > 0.0)
+        .collect();
+    let middle = steps.len() / 2;
+    let period = if steps.is_empty() {
+        0.0
+    } else {
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    };
+    let gap = GAP_TIME.max(GAP_PERIODS * period);
+    let mut out = Segments::default();
+    let mut part: Vec<usize> = Vec::new();
+    let mut last = f64::NEG_INFINITY;
+    for &(row, time) in times {
+        let step = time - last;
+        if !part.is_empty() {
+            if step == 0.0 {
+                out.duplicates.push(row);
+                continue;
+            }
+            let restart = step < -NEW_RUN_PERIODS * period;
+            if step < 0.0 && !restart {
+                out.backwards.push(row);
+                continue;
+            }
+            if restart || step > gap {
+                if restart {
+                    out.restarts.push(row);
+                } else {
+                    out.gaps.push((row, step));
+                }
+                out.parts.push(std::mem::take(&mut part));
+            }
+        }
+        part.push(row);
+        last = time;
+    }
+    if !part.is_empty() {
+        out.parts.push(part);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(times: &[f64]) -> Segments {
+        segment(&times.iter().copied().enumerate().collect::<Vec<_>>())
+    }
+
+    fn every_tenth(from: f64, n: usize) -> Vec<f64> {
+        (0..n).map(|k| from + 0.1 * k as f64).collect()
+    }
+
+    #[test]
+    fn even_time_stamps_are_one_part() {
+        let out = of(&every_tenth(5.0, 20));
+        assert_eq!(out.parts, [(0..20).collect::<Vec<_>>()]);
+        assert_eq!(of(&[]).parts, Vec::<Vec<usize>>::new());
+    }
+
+    #[test]
+    fn duplicates_and_small_steps_back_are_dropped() {
+        let mut times = every_tenth(0.0, 20);
+        times[5] = times[4];
+        times[10] = times[9] - 0.05;
+        let out = of(&times);
+        assert_eq!((out.duplicates, out.backwards), (vec![5], vec![10]));
+        assert_eq!(out.parts.len(), 1);
+        assert_eq!(out.parts[0].len(), 18);
+    }
+
+    #[test]
+    fn large_steps_start_a_new_part() {
+        let mut times = every_tenth(0.0, 50);
+        times.extend(every_tenth(0.0, 50));
+        times.extend(every_tenth(7.0, 50));
+        let out = of(&times);
+        assert_eq!(out.restarts, [50]);
+        assert_eq!(out.gaps.len(), 1);
+        assert_eq!(out.gaps[0].0, 100);
+        assert_eq!(
+            out.parts.iter().map(Vec::len).collect::<Vec<_>>(),
+            [50, 50, 50]
+        );
+    }
+}

@@ -1,0 +1,93 @@
+//! A log as it stands in its file: named columns of numbers.
+
+use std::collections::BTreeMap;
+
+use loopsight_core::unit::split_name;
+
+use crate::error::Location;
+
+/// Columns and rows of a log, in the units of the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// File name, or what else the log is called.
+    pub source: String,
+    /// Columns, as in the header.
+    pub columns: Vec<ColumnName>,
+    /// Rows, in the runs that the file itself separates.
+    pub runs: Vec<TableRun>,
+    /// Columns of words, by index: the number in a row is the index of the word here.
+    pub labels: BTreeMap<usize, Vec<String>>,
+}
+
+/// Header of one column.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ColumnName {
+    /// As in the header, e.g. `speed_rpm`.
+    pub text: String,
+    /// Without the unit, e.g. `speed`.
+    pub name: String,
+    /// The unit at the end of the header, e.g. `rpm`.
+    pub unit: Option<String>,
+}
+
+/// Rows that follow one another.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TableRun {
+    /// Name; empty when the file gives none.
+    pub name: String,
+    /// Values, row by row; NaN: missing.
+    pub rows: Vec<f64>,
+    /// Line of the first row, from 1; 0 when the format has no lines.
+    pub first_line: usize,
+    /// Line of every row; empty when rows stand on consecutive lines, or there are none.
+    pub lines: Vec<usize>,
+}
+
+impl ColumnName {
+    /// Splits a header.
+    pub fn new(text: &str) -> Self {
+        let (name, unit) = split_name(text);
+        Self {
+            text: text.to_owned(),
+            name: name.to_owned(),
+            unit: unit.map(str::to_owned),
+        }
+    }
+}
+
+impl TableRun {
+    /// Number of the line on which a row (from 0) stands; none when the format has no lines.
+    pub fn line(&self, row: usize) -> Option<usize> {
+        match self.lines.get(row) {
+            Some(line) => Some(*line),
+            None if self.first_line > 0 => Some(self.first_line + row),
+            None => None,
+        }
+    }
+}
+
+impl Table {
+    /// Headers, as in the file.
+    pub fn column_texts(&self) -> Vec<String> {
+        self.columns.iter().map(|c| c.text.clone()).collect()
+    }
+
+    /// Rows of a run as slices.
+    pub(crate) fn rows<'t>(&self, run: &'t TableRun) -> std::slice::ChunksExact<'t, f64> {
+        run.rows.chunks_exact(self.columns.len().max(1))
+    }
+
+    /// Place of a value; `row` and `column` from 0.
+    pub(crate) fn location(&self, run: &TableRun, row: usize, column: usize) -> Location {
+        Location {
+            line: run.line(row),
+            run: run.name.clone(),
+            row: row + 1,
+            column: self
+                .columns
+                .get(column)
+                .map_or_else(String::new, |c| c.text.clone()),
+            column_number: column + 1,
+        }
+    }
+}
