@@ -9,8 +9,10 @@
 //! voltage_left = { sum = [{ constant = 2.0 }, { sine = { amplitude = 1.0, frequency_hz = 0.5 } }] }
 //! ```
 //!
-//! Values are in the SI unit of the signal they drive. References: prbs and multi-level sequences,
-//! L. Ljung (1999), "System Identification", 2nd edition, section 13.3; chirp, the same, p. 423.
+//! Values are in the SI unit of the signal they drive.
+//!
+//! Reference: L. Ljung (1999), "System Identification: Theory for the User", 2nd edition, section
+//! 13.3, on pseudo-random binary signals, sums of sines and chirps.
 
 mod sequence;
 

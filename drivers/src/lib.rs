@@ -1,1 +1,30 @@
+//! What stands between a loop and a robot, one file per driver.
+//!
+//! Host drivers (feature `std`): [`Simulated`], any plant as the robot, and [`Replay`], a recording
+//! as the robot. Both are parts of a loop file, `[driver.<id>]`, and are found in the registry by
+//! whoever says `use loopsight_drivers as _;`.
+
 #![cfg_attr(not(feature = "std"), no_std)]
+
+#[cfg(feature = "std")]
+mod batch;
+#[cfg(feature = "std")]
+mod encoder;
+#[cfg(test)]
+#[cfg(feature = "std")]
+mod fixture;
+#[cfg(feature = "std")]
+mod replay;
+#[cfg(feature = "std")]
+mod robot;
+#[cfg(feature = "std")]
+mod simulated;
+
+#[cfg(feature = "std")]
+pub use batch::simulate_inputs;
+#[cfg(feature = "std")]
+pub use encoder::Counter;
+#[cfg(feature = "std")]
+pub use replay::Replay;
+#[cfg(feature = "std")]
+pub use simulated::{Limit, Simulated};
