@@ -1,0 +1,135 @@
+//! `[estimator.rls]`: the settings, on a host and without one, and what is wrong with them.
+
+use core::fmt;
+
+/// What the TOML table of `rls` holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "std",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+pub struct RlsSettings {
+    /// Forgetting `λ` in (0, 1]; 1 weighs all samples alike.
+    pub forgetting: f64,
+    /// The covariance starts as this multiple of the identity. Large against
+    /// `(expected size of θ / noise of y)²`, the start is forgotten after a few samples.
+    pub initial_covariance: f64,
+    /// `p_max`; `None` for the initial covariance: never less certain than at the start.
+    #[cfg_attr(feature = "std", serde(skip_serializing_if = "Option::is_none"))]
+    pub covariance_limit: Option<f64>,
+}
+
+impl Default for RlsSettings {
+    fn default() -> Self {
+        Self {
+            forgetting: 1.0,
+            initial_covariance: 1e6,
+            covariance_limit: None,
+        }
+    }
+}
+
+/// Why an estimator could not be made; each variant holds what was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RlsError {
+    /// No parameters, or one that is not finite.
+    Theta,
+    /// `forgetting` outside (0, 1].
+    Forgetting(f64),
+    /// `initial_covariance` not a number above 0.
+    InitialCovariance(f64),
+    /// `covariance_limit` below the initial covariance, or too large for the scalar.
+    CovarianceLimit(f64),
+}
+
+impl RlsError {
+    /// The setting that is to blame; empty for the start value.
+    pub fn key(&self) -> &'static str {
+        match self {
+            RlsError::Theta => "",
+            RlsError::Forgetting(_) => "forgetting",
+            RlsError::InitialCovariance(_) => "initial_covariance",
+            RlsError::CovarianceLimit(_) => "covariance_limit",
+        }
+    }
+}
+
+impl fmt::Display for RlsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RlsError::Theta => {
+                f.write_str("the start value is empty or not finite, expected finite numbers")
+            }
+            RlsError::Forgetting(found) => write!(
+                f,
+                "`forgetting` is {found}, expected a number above 0 and up to 1"
+            ),
+            RlsError::InitialCovariance(found) => write!(
+                f,
+                "`initial_covariance` is {found}, expected a number above 0"
+            ),
+            RlsError::CovarianceLimit(found) => write!(
+                f,
+                "`covariance_limit` is {found}, expected a finite number not below \
+                 `initial_covariance`"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for RlsError {}
+
+#[cfg(feature = "std")]
+mod part {
+    use loopsight_core::registry::{BuildError, EstimatorPart, PartMeta, Setting};
+    use loopsight_core::{Estimator, declare_part};
+    use nalgebra::DVector;
+
+    use super::RlsSettings;
+    use crate::Rls;
+
+    const META: PartMeta = PartMeta {
+        id: "rls",
+        role: "estimator",
+        summary: "recursive least squares with exponential forgetting",
+        equation: "K = P φ/(λ + φᵀP φ);  θ <- θ + K (y - φᵀθ);  P <- (P - K φᵀP)/λ, P_ii <= p_max",
+        reference: "Åström, Wittenmark (2008), Adaptive Control, ch. 2 and 11; Bierman (1977), \
+                    Factorization Methods for Discrete Sequential Estimation, ch. V",
+        example: "[estimator.rls]\nforgetting = 0.999\ninitial_covariance = 1e6\n",
+        settings: &[
+            Setting::new(
+                "forgetting",
+                "1",
+                "weight of a sample against the next one, above 0 and up to 1; default 1: all \
+                 samples count alike",
+            ),
+            Setting::new(
+                "initial_covariance",
+                "1",
+                "the covariance starts as this multiple of the identity (parameter unit squared \
+                 over measurement unit squared); default 1e6",
+            ),
+            Setting::new(
+                "covariance_limit",
+                "1",
+                "greatest diagonal entry of the covariance, for times without excitation; \
+                 default: the initial covariance",
+            ),
+        ],
+    };
+
+    #[typetag::serde(name = "rls")]
+    impl EstimatorPart for RlsSettings {
+        fn meta(&self) -> &'static PartMeta {
+            &META
+        }
+        fn build(&self, theta: &[f64]) -> Result<Box<dyn Estimator<f64>>, BuildError> {
+            let rls = Rls::new(DVector::from_column_slice(theta), self)
+                .map_err(|error| BuildError::at(error.key(), error.to_string()))?;
+            Ok(Box::new(rls))
+        }
+    }
+    declare_part!(&META);
+}
