@@ -1,0 +1,375 @@
+//! `[controller.feedback_linearizing_pi]`: what a file says, and the controller built from it.
+
+use loopsight_core::model::Model;
+use loopsight_core::registry::{BuildError, ControllerPart, PartMeta, Setting};
+use loopsight_core::{AffineModel, Controller, declare_part};
+use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
+
+use super::{DesignError, FeedbackLinearizingPi};
+use crate::{PiResponse, Rule, Singular, gains, solve};
+
+/// One number for all channels, or a list of one per channel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected a number, or a list of numbers, one per channel"
+)]
+pub enum PerChannel {
+    /// The same for all.
+    All(f64),
+    /// One each, in the order of the controlled states or inputs.
+    Each(Vec<f64>),
+}
+
+impl PerChannel {
+    /// The numbers one by one; a single one where it holds for all.
+    fn listed(&self) -> &[f64] {
+        match self {
+            PerChannel::All(value) => std::slice::from_ref(value),
+            PerChannel::Each(values) => values,
+        }
+    }
+
+    fn expand(&self, key: &str, n: usize) -> Result<DVector<f64>, BuildError> {
+        match self {
+            PerChannel::All(value) => Ok(DVector::repeat(n, *value)),
+            PerChannel::Each(values) if values.len() == n => Ok(DVector::from_column_slice(values)),
+            PerChannel::Each(values) => Err(BuildError::at(
+                key,
+                format!(
+                    "`{key}` has {} numbers, expected one, or a list of {n}",
+                    values.len()
+                ),
+            )),
+        }
+    }
+}
+
+/// What the TOML table of `feedback_linearizing_pi` holds: gains, or what they follow from, or an
+/// acceleration without feedback.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FeedbackLinearizingPiSettings {
+    /// `K_p`, 1/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proportional: Option<PerChannel>,
+    /// `K_i`, 1/s².
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub integral: Option<PerChannel>,
+    /// Settling time (2 %), s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub settling_time_s: Option<PerChannel>,
+    /// Damping `ξ`; 1 where only the settling time is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping: Option<PerChannel>,
+    /// How gains follow from the settling time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rule: Option<Rule>,
+    /// Greatest magnitude of each input, in its unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit: Option<PerChannel>,
+    /// Constant acceleration instead of a PI law, in the unit of each controlled state per second.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub open_loop_acceleration: Option<Vec<f64>>,
+}
+
+const META: PartMeta = PartMeta {
+    id: "feedback_linearizing_pi",
+    role: "controller",
+    summary: "inverts the model so that each controlled state is one integrator, with a PI law \
+              around each",
+    equation: "V = G⁻¹ (ν - f);  ν = K_p (r - y) + K_i ∫(r - y) dt;  \
+               H(s) = (K_p s + K_i)/(s² + K_p s + K_i);  K_p = 2 ξ ω_n, K_i = ω_n²",
+    reference: "Alves, Lages, Henriques (2018), IFAC PapersOnLine 51-15, 437-442, equations \
+                (48)-(52); Hanus, Kinnaert, Henrotte (1987), Automatica 23(6), 729-739",
+    example: "[controller.feedback_linearizing_pi]\nsettling_time_s = 0.45\ndamping = 1.0\n\
+              limit = 12.0\n",
+    settings: &[
+        Setting::new(
+            "proportional",
+            "1/s",
+            "proportional gain, one for all controlled states or a list; with `integral`, instead \
+             of `settling_time_s`",
+        ),
+        Setting::new(
+            "integral",
+            "1/s^2",
+            "integral gain, one for all controlled states or a list",
+        ),
+        Setting::new(
+            "settling_time_s",
+            "s",
+            "time from which on the error of a step stays within 2 %, one for all controlled \
+             states or a list",
+        ),
+        Setting::new(
+            "damping",
+            "1",
+            "damping of the poles, one for all controlled states or a list; default 1",
+        ),
+        Setting::new(
+            "rule",
+            "",
+            "how gains follow from the settling time: `paper` (the default) by ω_n = 4/(ξ T_s), \
+             which leaves the zero of H(s) out and settles later, or `exact`",
+        ),
+        Setting::new(
+            "limit",
+            "",
+            "greatest magnitude of the inputs, in their unit, one for all or a list; default: no \
+             limit",
+        ),
+        Setting::new(
+            "open_loop_acceleration",
+            "",
+            "constant accelerations, one per controlled state, in its unit per second, instead of \
+             the PI law: shows the linearisation alone",
+        ),
+    ],
+};
+
+/// Gains `(K_p, K_i)`, or the constant accelerations.
+enum Demand {
+    Gains(Vec<(f64, f64)>),
+    Acceleration(Vec<f64>),
+}
+
+impl FeedbackLinearizingPiSettings {
+    /// What is asked for, of `n` channels; with `n` unknown, as many as the longest list has.
+    fn demand(&self, n: Option<usize>) -> Result<Demand, BuildError> {
+        let of_gains = [
+            ("proportional", self.proportional.is_some()),
+            ("integral", self.integral.is_some()),
+        ];
+        let of_design = [
+            ("settling_time_s", self.settling_time_s.is_some()),
+            ("damping", self.damping.is_some()),
+            ("rule", self.rule.is_some()),
+        ];
+        let first = |list: &[(&'static str, bool)]| list.iter().find(|(_, is)| *is).map(|k| k.0);
+        let ways = "give `proportional` and `integral`, or `settling_time_s` (and `damping`, \
+                    `rule`), or `open_loop_acceleration`";
+        let (gain, design) = (first(&of_gains), first(&of_design));
+        let n = n.unwrap_or_else(|| {
+            [
+                &self.proportional,
+                &self.integral,
+                &self.settling_time_s,
+                &self.damping,
+            ]
+            .into_iter()
+            .flatten()
+            .map(|list| list.listed().len())
+            .max()
+            .unwrap_or(1)
+        });
+        if let Some(acceleration) = &self.open_loop_acceleration {
+            return match gain.or(design) {
+                None => Ok(Demand::Acceleration(acceleration.clone())),
+                Some(key) => Err(BuildError::at(
+                    key,
+                    format!("`{key}` stands beside `open_loop_acceleration`, expected one of them"),
+                )
+                .help(ways)),
+            };
+        }
+        if let (Some(gain), Some(design)) = (gain, design) {
+            return Err(BuildError::at(
+                design,
+                format!("`{design}` stands beside `{gain}`, expected one way to give the gains"),
+            )
+            .help(ways));
+        }
+        if let (Some(proportional), Some(integral)) = (&self.proportional, &self.integral) {
+            let proportional = proportional.expand("proportional", n)?;
+            let integral = integral.expand("integral", n)?;
+            return Ok(Demand::Gains(
+                proportional
+                    .iter()
+                    .copied()
+                    .zip(integral.iter().copied())
+                    .collect(),
+            ));
+        }
+        let Some(settling) = &self.settling_time_s else {
+            let (key, message) = match (gain, design) {
+                (Some("proportional"), _) => ("proportional", "`integral` is missing"),
+                (Some(_), _) => ("integral", "`proportional` is missing"),
+                (None, Some(key)) => (key, "`settling_time_s` is missing"),
+                (None, None) => ("", "no gains are given"),
+            };
+            return Err(BuildError::at(key, message).help(ways));
+        };
+        let settling = settling.expand("settling_time_s", n)?;
+        let damping = self
+            .damping
+            .as_ref()
+            .unwrap_or(&PerChannel::All(1.0))
+            .expand("damping", n)?;
+        let rule = self.rule.unwrap_or_default();
+        settling
+            .iter()
+            .zip(damping.iter())
+            .map(|(settling, damping)| {
+                gains(rule, *settling, *damping).ok_or_else(|| {
+                    let (key, found, unit) = if *settling > 0.0 && settling.is_finite() {
+                        ("damping", damping, "")
+                    } else {
+                        ("settling_time_s", settling, " s")
+                    };
+                    BuildError::at(
+                        key,
+                        format!("`{key}` is {found}{unit}, expected a number above 0{unit}"),
+                    )
+                })
+            })
+            .collect::<Result<Vec<_>, _>>()
+            .map(Demand::Gains)
+    }
+}
+
+/// Refuses a model that cannot be inverted at rest.
+fn check_invertible(model: &Model) -> Result<usize, BuildError> {
+    let plant = model.plant;
+    let Some(mut affine) = model.affine() else {
+        return Err(BuildError::at(
+            "",
+            format!(
+                "`{}` needs a control-affine plant, but `{}` declares no controlled states",
+                META.id, plant.id
+            ),
+        ));
+    };
+    let n = affine.size();
+    let (mut drift, mut matrix) = (vec![f64::NAN; n], vec![f64::NAN; n * n]);
+    affine.evaluate(&vec![0.0; n], &mut drift, &mut matrix);
+    let shown: Vec<&[f64]> = matrix.chunks(n.max(1)).collect();
+    let shown = format!("G = {shown:?}");
+    let state = |row: usize| {
+        plant
+            .controlled
+            .get(row)
+            .map_or("?", |s| plant.states[*s].id)
+    };
+    let message = match solve(&mut matrix.clone(), &mut drift, &mut vec![0.0; n]) {
+        Ok(()) => return Ok(n),
+        Err(Singular::Row(row)) => format!("no input moves `{}`", state(row)),
+        Err(Singular::Column(column)) => format!(
+            "`{}` moves none of the controlled states",
+            plant.inputs.get(column).map_or("?", |s| s.id)
+        ),
+        Err(Singular::Dependent(pivot)) => format!(
+            "the inputs do not move the controlled states independently (scaled pivot {pivot:.1e}, \
+             expected at least 1e-6)"
+        ),
+        Err(Singular::NotFinite) => {
+            let missing = model.missing_values();
+            return Err(BuildError::at(
+                "",
+                if missing.is_empty() {
+                    format!("the model of `{}` is not finite at rest, {shown}", plant.id)
+                } else {
+                    format!("the model has no value for {}", missing.join(", "))
+                },
+            )
+            .help("fit the model first, or give the values in the model file"));
+        }
+    };
+    Err(BuildError::at(
+        "",
+        format!(
+            "the input matrix of `{}` cannot be inverted: {message}; {shown}",
+            plant.id
+        ),
+    ))
+}
+
+#[typetag::serde(name = "feedback_linearizing_pi")]
+impl ControllerPart for FeedbackLinearizingPiSettings {
+    fn meta(&self) -> &'static PartMeta {
+        &META
+    }
+
+    fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError> {
+        let n = check_invertible(model)?;
+        let limit = match &self.limit {
+            None => DVector::repeat(n, f64::INFINITY),
+            Some(limit) => limit.expand("limit", n)?,
+        };
+        let built = match self.demand(Some(n))? {
+            Demand::Gains(gains) => FeedbackLinearizingPi::new(
+                &DVector::from_iterator(n, gains.iter().map(|g| g.0)),
+                &DVector::from_iterator(n, gains.iter().map(|g| g.1)),
+                &limit,
+                period,
+            ),
+            Demand::Acceleration(acceleration) => {
+                let listed = PerChannel::Each(acceleration);
+                let acceleration = listed.expand("open_loop_acceleration", n)?;
+                FeedbackLinearizingPi::open_loop(&acceleration, &limit, period)
+            }
+        };
+        let controller = built.map_err(|error| {
+            let key = match error {
+                DesignError::Proportional(..) => "proportional",
+                DesignError::Integral(..) => "integral",
+                DesignError::Limit(..) => "limit",
+                DesignError::Acceleration(..) => "open_loop_acceleration",
+                DesignError::Period(_) | DesignError::Lengths => "",
+            };
+            BuildError::at(key, error.to_string())
+        })?;
+        Ok(Box::new(controller))
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        match self.demand(None) {
+            Err(_) => {}
+            Ok(Demand::Acceleration(acceleration)) => notes.push(format!(
+                "open loop: constant accelerations {acceleration:?}, the reference is not followed"
+            )),
+            Ok(Demand::Gains(gains)) => {
+                let asked = self
+                    .settling_time_s
+                    .as_ref()
+                    .map_or(&[][..], |s| s.listed());
+                for (i, (kp, ki)) in gains.iter().enumerate() {
+                    let channel = if gains.len() > 1 {
+                        format!("channel {}: ", i + 1)
+                    } else {
+                        String::new()
+                    };
+                    let Some(response) = PiResponse::new(*kp, *ki) else {
+                        continue;
+                    };
+                    let design = format!(
+                        "{channel}K_p = {kp:.4} 1/s, K_i = {ki:.4} 1/s^2 settle within 2 % from \
+                         {:.3} s on and overshoot by {:.1} %",
+                        response.settling_time(),
+                        100.0 * response.overshoot()
+                    );
+                    notes.push(match asked.get(i).or(asked.first()) {
+                        None => design,
+                        Some(asked) if self.rule == Some(Rule::Exact) => {
+                            format!("{design}; asked for: {asked} s")
+                        }
+                        Some(asked) => format!(
+                            "{design}; asked for: {asked} s, which the rule 4/(ξ T_s) misses \
+                             because it leaves the zero of H(s) out; `rule = \"exact\"` keeps it"
+                        ),
+                    });
+                }
+            }
+        }
+        if let Some(limit) = &self.limit {
+            notes.push(format!(
+                "inputs are clipped at ±{:?}; the times above hold below that",
+                limit.listed()
+            ));
+        }
+        notes
+    }
+}
+declare_part!(&META);
