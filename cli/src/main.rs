@@ -1,1 +1,7 @@
-fn main() {}
+//! The command `loopsight`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    loopsight_cli::run()
+}

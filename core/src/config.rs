@@ -108,6 +108,11 @@ impl Source {
         }
     }
 
+    /// Whether the document has this key at its top.
+    pub fn has(&self, key: &str) -> bool {
+        self.document.contains_key(key)
+    }
+
     /// Reads the whole document as a `T`.
     pub fn read<T: DeserializeOwned>(&self) -> Result<T, Box<ConfigError>> {
         let deserializer = match toml::Deserializer::parse(&self.text) {

@@ -14,10 +14,12 @@ pub enum Scheme {
     /// Euler's, the paper's (40)(41): `(u(k+1) - u(k))/T = φ(u(k), V(k)) θ`. Biased on a
     /// continuous robot: it estimates `(e^{K_A T} - 1)/T` where `K_A` is meant.
     Euler,
-    /// Integrated over the period: `(u(k+1) - u(k))/T = 1/T ∫ φ dt θ`, the integral by the
-    /// trapezoidal rule; its bias is of order `(K_A T)²/12`. Where the sensor itself is a mean over
-    /// the period, the difference of two means is an integral weighted by a triangle over two
-    /// periods, and the inputs of both periods count half each.
+    /// Integrated over the period: `(u(k+1) - u(k))/T = 1/T ∫ φ dt θ` with the state taken as a
+    /// straight line between the samples, which Simpson's rule integrates exactly for quadratic
+    /// regressors; the bias is of order `(K_A T)²/12`. Where the sensor itself is a mean over the
+    /// period, the difference of two means is an integral weighted by a triangle over two periods:
+    /// the inputs of both periods count half each, and the rule for that weight is
+    /// `(φ(a) + φ((a + b)/2) + φ(b))/3`.
     #[default]
     Integrated,
 }
@@ -54,6 +56,7 @@ pub struct Regression {
     x: DVector<f64>,
     difference: DVector<f64>,
     x_before: Vec<f64>,
+    x_middle: Vec<f64>,
     input_before: Vec<f64>,
     input_mean: Vec<f64>,
     p: Vec<f64>,
@@ -107,6 +110,7 @@ impl Regression {
             x: DVector::zeros(nx),
             difference: DVector::zeros(offset.len()),
             x_before: vec![0.0; nx],
+            x_middle: vec![0.0; nx],
             input_before: vec![0.0; model.plant.inputs.len()],
             input_mean: vec![0.0; model.plant.inputs.len()],
             p: vec![0.0; model.plant.parameters.len()],
@@ -252,23 +256,34 @@ impl Regression {
         let after = core::mem::replace(&mut self.x, DVector::zeros(0));
         let before = core::mem::take(&mut self.x_before);
         let u = core::mem::take(&mut self.input_mean);
+        let mut middle = core::mem::take(&mut self.x_middle);
+        for (m, (a, b)) in middle.iter_mut().zip(before.iter().zip(after.iter())) {
+            *m = 0.5 * (a + b);
+        }
+        let weights: [f64; 3] = match (self.scheme, self.means) {
+            (Scheme::Euler, _) => [1.0, 0.0, 0.0],
+            (Scheme::Integrated, false) => [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0],
+            (Scheme::Integrated, true) => [1.0 / 3.0; 3],
+        };
+        let points = [before.as_slice(), middle.as_slice(), after.as_slice()];
         let mut rows = core::mem::take(&mut self.rows);
         for row in &mut rows {
-            self.rate(&before, &u, None);
-            let mut drift = self.dx[row.state];
-            if self.scheme == Scheme::Integrated {
-                self.rate(after.as_slice(), &u, None);
-                drift = 0.5 * (drift + self.dx[row.state]);
-            }
-            for (phi, &j) in row.phi.iter_mut().zip(&row.parameters) {
-                *phi = self.regressor(&before, &u, row.state, j);
-                if self.scheme == Scheme::Integrated {
-                    *phi = 0.5 * (*phi + self.regressor(after.as_slice(), &u, row.state, j));
+            let mut drift = 0.0;
+            row.phi.fill(0.0);
+            for (point, weight) in points.iter().zip(weights) {
+                if weight == 0.0 {
+                    continue;
+                }
+                self.rate(point, &u, None);
+                drift += weight * self.dx[row.state];
+                for (phi, &j) in row.phi.iter_mut().zip(&row.parameters) {
+                    *phi += weight * self.regressor(point, &u, row.state, j);
                 }
             }
             row.y = (after[row.state] - before[row.state]) / distance - drift;
         }
         self.rows = rows;
+        self.x_middle = middle;
         self.input_mean = u;
         self.x_before = before;
         self.x = after;

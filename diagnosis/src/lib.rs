@@ -9,6 +9,7 @@ mod prediction;
 mod regression;
 mod rls;
 mod score;
+pub mod tracking;
 
 pub use compare::{CompareError, Comparison, RunTrace, SignalTrace, compare};
 pub use fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};

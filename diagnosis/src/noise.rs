@@ -94,6 +94,18 @@ impl Arma {
         }
     }
 
+    /// `ε = H⁻¹ e`.
+    pub(crate) fn whiten(&self, e: &[f64]) -> Vec<f64> {
+        let (mut e_before, mut eps) = (0.0, 0.0);
+        e.iter()
+            .map(|e| {
+                eps = e - self.a * e_before - self.c * eps;
+                e_before = *e;
+                eps
+            })
+            .collect()
+    }
+
     /// Transposed colouring: `Hᵀ j` with `e = H ε`, in place. With it
     /// `jᵀ cov(e) j = variance · |Hᵀ j|²`.
     pub(crate) fn transpose(&self, j: &mut [f64]) {
@@ -112,50 +124,82 @@ impl Arma {
 
 /// Residuals and sensitivities of one signal in one run.
 pub(crate) struct Block {
-    /// Index of the signal.
-    pub(crate) signal: usize,
     /// Residuals by sample.
     pub(crate) residual: Vec<f64>,
     /// Sensitivities: samples × unknowns, weighted as in the fit.
     pub(crate) jacobian: DMatrix<f64>,
 }
 
-/// Covariance of a least-squares estimate when the noise of each signal is coloured:
-/// `(JᵀJ)⁻¹ Jᵀ cov(e) J (JᵀJ)⁻¹` with `cov(e)` from a noise model per signal, fitted to the
-/// residuals of all runs (T. Söderström, P. Stoica, 1989, "System Identification", section 7.4
-/// and complement C7.4, for the estimate; the noise models are [`Arma`]).
+/// Covariance of a least-squares estimate when the noise of the signals is coloured:
+/// `(JᵀJ)⁻¹ Jᵀ cov(e) J (JᵀJ)⁻¹`.
 ///
-/// Returns the covariance and the noise models; `inverse_gram` is `(JᵀJ)⁻¹` or its pseudo-inverse.
+/// A noise model [`Arma`] per signal takes the bulk of the colour out of the residuals, `ε = H⁻¹ e`
+/// and `h = Hᵀ J`, so that `Jᵀ e = Σ_k s(k)` with the scores `s(k) = Σ_i h_i(k) ε_i(k)` over the
+/// signals `i`. What is left (rounding at constant speed is periodic, signals from the same
+/// encoders round together, noise is larger in motion than at rest) is in the autocovariance of
+/// the scores, weighted by Bartlett's window:
+///
+/// ```text
+/// Jᵀ cov(e) J ≈ Σ_|l|<=L (1 - |l|/(L+1)) Σ_k s(k) s(k-l)ᵀ
+/// ```
+///
+/// (T. Söderström, P. Stoica, 1989, "System Identification", section 7.4, for the estimate;
+/// prewhitening as D. W. K. Andrews, J. C. Monahan, 1992, Econometrica 60, 953–966, scores and
+/// window as W. K. Newey, K. D. West, 1987, Econometrica 55, 703–708.)
+///
+/// `inverse_gram` is `(JᵀJ)⁻¹` or its pseudo-inverse; each run has one block per signal.
 pub(crate) fn covariance(
-    blocks: &[Block],
+    runs: &[Vec<Block>],
     n_signals: usize,
     inverse_gram: &DMatrix<f64>,
     unknowns: usize,
-) -> (DMatrix<f64>, Vec<Arma>) {
-    let samples: usize = blocks.iter().map(|b| b.residual.len()).sum();
+) -> DMatrix<f64> {
     let models: Vec<Arma> = (0..n_signals)
         .map(|signal| {
-            let series: Vec<&[f64]> = blocks
+            let series: Vec<&[f64]> = runs
                 .iter()
-                .filter(|b| b.signal == signal)
-                .map(|b| b.residual.as_slice())
+                .map(|blocks| blocks[signal].residual.as_slice())
                 .collect();
             Arma::fit(&series)
         })
         .collect();
-    // Degrees of freedom that the fit has used up.
-    let inflation = samples as f64 / (samples.saturating_sub(unknowns)).max(1) as f64;
+    let samples: usize = runs.iter().flatten().map(|b| b.residual.len()).sum();
+    let lags = window(samples / n_signals.max(1));
     let columns = inverse_gram.ncols();
-    let mut meat = DMatrix::zeros(columns, columns);
-    for block in blocks {
-        let model = models[block.signal];
-        let mut coloured = block.jacobian.clone();
-        for mut column in coloured.column_iter_mut() {
-            model.transpose(column.as_mut_slice());
+    let mut meat = DMatrix::<f64>::zeros(columns, columns);
+    for blocks in runs {
+        // One column per sample.
+        let mut scores = DMatrix::<f64>::zeros(columns, blocks[0].residual.len());
+        for (block, model) in blocks.iter().zip(&models) {
+            let mut h = block.jacobian.clone();
+            for mut column in h.column_iter_mut() {
+                model.transpose(column.as_mut_slice());
+            }
+            for (k, eps) in model.whiten(&block.residual).iter().enumerate() {
+                for column in 0..columns {
+                    scores[(column, k)] += h[(k, column)] * eps;
+                }
+            }
         }
-        meat += coloured.tr_mul(&coloured) * (model.variance * inflation);
+        let n = scores.ncols();
+        meat += &scores * scores.transpose();
+        for lag in 1..=lags.min(n.saturating_sub(1)) {
+            let weight = 1.0 - lag as f64 / (lags + 1) as f64;
+            let product =
+                scores.columns(lag, n - lag) * scores.columns(0, n - lag).transpose() * weight;
+            meat += product.transpose();
+            meat += product;
+        }
     }
-    (inverse_gram * meat * inverse_gram, models)
+    // Degrees of freedom that the fit has used up.
+    meat *= samples as f64 / (samples.saturating_sub(unknowns)).max(1) as f64;
+    inverse_gram * meat * inverse_gram
+}
+
+/// Lags whose covariances are looked at, for `n` samples: Newey and West's `1.3 n^(1/2)` is cut at
+/// half a second of common sampling rates.
+fn window(n: usize) -> usize {
+    ((1.3 * (n as f64).sqrt()) as usize).min(50).min(n / 4)
 }
 
 #[cfg(test)]

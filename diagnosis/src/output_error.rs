@@ -6,9 +6,9 @@ use std::convert::Infallible;
 
 use basin::{
     BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet, Constraints,
-    Executor, Jacobian, Residual, TerminationCode,
+    Executor, Jacobian, Residual,
 };
-use loopsight_core::model::{Model, pseudo_inverse};
+use loopsight_core::model::Model;
 use loopsight_core::run::Run;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -32,18 +32,31 @@ use crate::score::Tally;
 /// by Levenberg–Marquardt within the ranges of the declarations, with exact derivatives (dual
 /// numbers through the integrator). Missing measurements count nothing. (L. Ljung, 1999, "System
 /// Identification", 2nd edition, section 7.2 and chapter 10; output error is section 4.2.)
+///
+/// Where the residuals turn out to be those of rounded counts (a moving average with `c` near -1
+/// and nothing slower, see [`noise::Arma`]), a second pass weights them by that: the maximum
+/// likelihood estimate for `e(k) = ε(k) + c ε(k-1)`, with the value of `ε` before each run as one
+/// more unknown. Other colours are left as they are: they are a model error, and a fit to the free
+/// run should see it.
 pub(crate) fn fit(
     model: &Model,
     runs: &[Run],
     settings: &FitSettings,
     progress: &(dyn Fn(u64, f64) + Sync),
 ) -> Result<Fit, FitError> {
-    let problem = Problem::new(model, runs, progress)?;
+    let mut problem = Problem::new(model, runs, progress)?;
     let start = problem.start(settings)?;
-    let iterations = Cell::new(0);
-    let solution = problem.solve(&start, settings.max_iterations, &iterations)?;
-    Ok(problem.result(&solution, iterations.get()))
+    let mut solution = problem.solve(&start, settings.max_iterations)?;
+    if let Some(start) = problem.whiten(&solution) {
+        solution = problem.solve(&start, settings.max_iterations)?;
+    }
+    Ok(problem.result(&solution))
 }
+
+/// A residual whose noise model has `c` below this and `a` within ±[`SLOW`] is rounded counts.
+const ROUNDED: f64 = -0.8;
+/// See [`ROUNDED`].
+const SLOW: f64 = 0.3;
 
 struct Problem<'a> {
     model: &'a Model,
@@ -59,6 +72,8 @@ struct Problem<'a> {
     scales: Vec<f64>,
     lower: DVector<f64>,
     upper: DVector<f64>,
+    /// Moving-average coefficient by signal; empty in the first pass.
+    rounding: Vec<f64>,
     evaluations: Cell<u64>,
     cache: RefCell<Option<(DVector<f64>, DMatrix<f64>)>>,
     samples: f64,
@@ -126,6 +141,7 @@ impl<'a> Problem<'a> {
             scales,
             lower: DVector::from_vec(lower),
             upper: DVector::from_vec(upper),
+            rounding: Vec::new(),
             evaluations: Cell::new(0),
             cache: RefCell::new(None),
             samples,
@@ -169,6 +185,93 @@ impl<'a> Problem<'a> {
         })
     }
 
+    /// Turns to the second pass if the residuals at `solution` are rounded counts; returns where it
+    /// starts.
+    fn whiten(&mut self, solution: &DVector<f64>) -> Option<DVector<f64>> {
+        let (residual, jacobian) = self.linearise(solution);
+        let blocks = self.blocks(&residual, &jacobian);
+        let n_signals = self.weights.len();
+        let rounding: Vec<f64> = (0..n_signals)
+            .map(|signal| {
+                let series: Vec<&[f64]> = blocks
+                    .iter()
+                    .map(|b| b[signal].residual.as_slice())
+                    .collect();
+                let model = noise::Arma::fit(&series);
+                let rounded = model.c < ROUNDED && model.a.abs() < SLOW;
+                if rounded { model.c } else { 0.0 }
+            })
+            .collect();
+        if rounding.iter().all(|c| *c == 0.0) {
+            return None;
+        }
+        self.rounding = rounding;
+        self.cache.replace(None);
+        let more = self.runs.len() * n_signals;
+        // In units of the first residuals, so that all unknowns are of order one.
+        let scale = residual.norm() / (residual.len() as f64).sqrt();
+        self.scales.extend(std::iter::repeat_n(scale, more));
+        self.lower = self
+            .lower
+            .clone()
+            .resize_vertically(self.scales.len(), f64::NEG_INFINITY);
+        self.upper = self
+            .upper
+            .clone()
+            .resize_vertically(self.scales.len(), f64::INFINITY);
+        Some(solution.clone().resize_vertically(self.scales.len(), 0.0))
+    }
+
+    /// First of the unknowns `ε` before the runs.
+    fn first_before(&self) -> usize {
+        self.free.len() + self.runs.len() * self.visible.len()
+    }
+
+    /// In the second pass, turns the weighted residuals of one run into `ε`.
+    fn filter(&self, run: usize, residual: &mut [f64], scaled: &DVector<f64>) {
+        let n_signals = self.weights.len();
+        for (signal, c) in self.rounding.iter().enumerate() {
+            if *c == 0.0 {
+                continue;
+            }
+            let unknown = self.first_before() + run * n_signals + signal;
+            let mut before = scaled[unknown] * self.scales[unknown];
+            for value in residual.iter_mut().skip(signal).step_by(n_signals) {
+                *value -= c * before;
+                before = *value;
+            }
+        }
+    }
+
+    /// As [`Problem::filter`] for the rows of the Jacobian that belong to one run.
+    fn filter_jacobian(
+        &self,
+        run: usize,
+        first_row: usize,
+        rows: usize,
+        jacobian: &mut DMatrix<f64>,
+    ) {
+        let n_signals = self.weights.len();
+        for (signal, c) in self.rounding.iter().enumerate() {
+            if *c == 0.0 {
+                continue;
+            }
+            let unknown = self.first_before() + run * n_signals + signal;
+            for column in 0..jacobian.ncols() {
+                let mut before = if column == unknown {
+                    self.scales[unknown]
+                } else {
+                    0.0
+                };
+                for row in (first_row + signal..first_row + rows).step_by(n_signals) {
+                    let value = &mut jacobian[(row, column)];
+                    *value -= c * before;
+                    before = *value;
+                }
+            }
+        }
+    }
+
     /// Parameter values and initial states behind scaled unknowns.
     fn unpack(&self, scaled: &DVector<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
         let mut values = nominal(self.model);
@@ -201,9 +304,10 @@ impl<'a> Problem<'a> {
     fn residual_vector(&self, scaled: &DVector<f64>) -> DVector<f64> {
         let (values, states) = self.unpack(scaled);
         let mut all = Vec::with_capacity(self.rows());
-        for (run, x0) in self.runs.iter().zip(&states) {
+        for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
             let mut residual = residuals(&predict(self.model, &values, x0, run), run);
             self.weigh(residual.as_mut_slice());
+            self.filter(index, residual.as_mut_slice(), scaled);
             all.extend_from_slice(residual.as_slice());
         }
         DVector::from_vec(all)
@@ -240,42 +344,39 @@ impl<'a> Problem<'a> {
                         -s.jacobian[(row, column)] * weight * self.scales[to];
                 }
             }
-            first_row += residual.len();
+            let rows = residual.len();
+            let of_run = &mut all.as_mut_slice()[first_row..first_row + rows];
+            self.filter(index, of_run, scaled);
+            self.filter_jacobian(index, first_row, rows, &mut jacobian);
+            first_row += rows;
         }
         *self.cache.borrow_mut() = Some((scaled.clone(), jacobian.clone()));
         (all, jacobian)
     }
 
-    fn solve(
-        &self,
-        start: &DVector<f64>,
-        max_iterations: u64,
-        iterations: &Cell<u64>,
-    ) -> Result<DVector<f64>, FitError> {
+    fn solve(&self, start: &DVector<f64>, max_iterations: u64) -> Result<DVector<f64>, FitError> {
         let solver = BoundedLevenbergMarquardt::<DVector<f64>, DMatrix<f64>>::new()
             .with_absolute_scaled_gradient_tolerance(1e-14)
-            .with_tau(1e-6);
+            .with_tau(1e-6)
+            .with_relative_cost_change_tolerance(1e-9)
+            .with_relative_step_tolerance(1e-10);
         let result = Executor::from_start(Borrowed(self), solver, start.clone())
             .max_iter(max_iterations)
-            .with_relative_cost_change_tolerance(1e-13)
-            .with_relative_step_tolerance(1e-11)
             .run();
         let result = match result {
             Ok(result) => result,
             Err(error) => return Err(FitError::Solver(error.to_string())),
         };
-        iterations.set(self.evaluations.get());
         let solution = result.param().clone();
-        let finite = solution.iter().all(|v| v.is_finite());
-        if result.report.termination == TerminationCode::SolverFailed && !finite {
+        if solution.iter().any(|v| !v.is_finite()) {
             return Err(FitError::Solver(
-                "the damping grew without bound".to_owned(),
+                "the parameters left the finite numbers".to_owned(),
             ));
         }
         Ok(solution)
     }
 
-    fn result(&self, solution: &DVector<f64>, iterations: u64) -> Fit {
+    fn result(&self, solution: &DVector<f64>) -> Fit {
         let (values, _) = self.unpack(solution);
         let (residual, jacobian) = self.linearise(solution);
         let gram = jacobian.tr_mul(&jacobian);
@@ -286,7 +387,7 @@ impl<'a> Problem<'a> {
         let flatness = Flatness::of(self, &gram, &norms);
         let blocks = self.blocks(&residual, &jacobian);
         let inverse = flatness.inverse(&norms);
-        let (covariance, _) =
+        let covariance =
             noise::covariance(&blocks, self.model.measured.len(), &inverse, norms.len());
 
         let mut fitted = self.model.clone();
@@ -333,32 +434,35 @@ impl<'a> Problem<'a> {
             method: Method::OutputError,
             nrmse_before: None,
             nrmse_fit: f64::NAN,
-            iterations,
+            iterations: self.evaluations.get(),
             flat: flatness.words,
             model: fitted,
             history: Vec::new(),
         }
     }
 
-    /// Splits residuals and Jacobian by run and signal, in time order.
-    fn blocks(&self, residual: &DVector<f64>, jacobian: &DMatrix<f64>) -> Vec<Block> {
+    /// Residuals and Jacobian by run and signal, in time order.
+    fn blocks(&self, residual: &DVector<f64>, jacobian: &DMatrix<f64>) -> Vec<Vec<Block>> {
         let n_signals = self.weights.len();
-        let mut blocks = Vec::new();
         let mut first_row = 0;
-        for run in self.runs {
-            for signal in 0..n_signals {
-                let rows: Vec<usize> = (0..run.len())
-                    .map(|k| first_row + k * n_signals + signal)
+        self.runs
+            .iter()
+            .map(|run| {
+                let blocks = (0..n_signals)
+                    .map(|signal| {
+                        let rows: Vec<usize> = (0..run.len())
+                            .map(|k| first_row + k * n_signals + signal)
+                            .collect();
+                        Block {
+                            residual: rows.iter().map(|r| residual[*r]).collect(),
+                            jacobian: jacobian.select_rows(&rows),
+                        }
+                    })
                     .collect();
-                blocks.push(Block {
-                    signal,
-                    residual: rows.iter().map(|r| residual[*r]).collect(),
-                    jacobian: jacobian.select_rows(&rows),
-                });
-            }
-            first_row += run.len() * n_signals;
-        }
-        blocks
+                first_row += run.len() * n_signals;
+                blocks
+            })
+            .collect()
     }
 }
 

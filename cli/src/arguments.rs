@@ -1,0 +1,155 @@
+//! What can be typed.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Adaptive control you can see into.
+#[derive(Debug, Parser)]
+#[command(
+    name = "loopsight",
+    version,
+    about = "Adaptive control you can see into: compose a control loop from TOML, hold its model against measurements, fit it, run it.",
+    after_help = "Exit status: 0 done, 1 the work failed, 2 the request or a file is wrong.",
+    propagate_version = true
+)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Check model, loop and experiment files, and logs, without doing anything with them.
+    Check(CheckOptions),
+    /// List the known plants, effects, estimators, controllers and drivers.
+    List(ListOptions),
+    /// Explain one of them: equation, parameters, channels, reference, example.
+    Explain(ExplainOptions),
+    /// Drive a simulated robot with an experiment and write its log.
+    Simulate(SimulateOptions),
+    /// Hold a model against a log: free run and one-step prediction.
+    Compare(CompareOptions),
+    /// Find the parameters of a model from a log, with intervals.
+    Fit(FitOptions),
+    /// Run a control loop.
+    Run(RunOptions),
+    /// Print a completion script for a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CheckOptions {
+    /// Model, loop or experiment files (TOML), or logs (CSV, SysId JSON).
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ListOptions {
+    /// Only these: plants, effects, estimators, controllers or drivers.
+    #[arg(value_enum)]
+    pub(crate) role: Option<RoleName>,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RoleName {
+    Plants,
+    Effects,
+    Estimators,
+    Controllers,
+    Drivers,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExplainOptions {
+    /// Id of a plant, an effect, an estimator, a controller or a driver.
+    pub(crate) id: String,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SimulateOptions {
+    /// Model file of the robot.
+    pub(crate) model: PathBuf,
+    /// Experiment file: inputs, duration, period, sensors' noise.
+    pub(crate) experiment: PathBuf,
+    /// The log to write (CSV).
+    #[arg(short, long, value_name = "LOG")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CompareOptions {
+    /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
+    #[arg(required = true, num_args = 1..=2, value_names = ["MODEL] [LOG"])]
+    pub(crate) files: Vec<PathBuf>,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write a page with pictures; opens offline in any browser.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) html: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct FitOptions {
+    /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
+    #[arg(required = true, num_args = 1..=2, value_names = ["MODEL] [LOG"])]
+    pub(crate) files: Vec<PathBuf>,
+    /// Judge the fitted model on this log, which it was not fitted to.
+    #[arg(long, value_name = "LOG2")]
+    pub(crate) test: Option<PathBuf>,
+    /// How the parameters are found.
+    #[arg(long, value_enum, default_value_t = MethodName::OutputError)]
+    pub(crate) method: MethodName,
+    /// The regression that recursive least squares is fed with.
+    #[arg(long, value_enum, default_value_t = SchemeName::Integrated)]
+    pub(crate) regression: SchemeName,
+    /// Write the fitted model here: the model file with its comments, the values replaced.
+    #[arg(short, long, value_name = "FITTED")]
+    pub(crate) output: Option<PathBuf>,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write a page with pictures; opens offline in any browser.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) html: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodName {
+    /// Recursive least squares, the paper's way.
+    Rls,
+    /// Least squares on the error of the free run.
+    OutputError,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SchemeName {
+    /// Euler's, the paper's (40)(41): biased on a continuous robot.
+    Euler,
+    /// Integrated over the sampling period.
+    Integrated,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RunOptions {
+    /// Loop file.
+    #[arg(value_name = "LOOP")]
+    pub(crate) file: PathBuf,
+    /// The log to write (CSV); by default what the loop file says.
+    #[arg(short, long, value_name = "LOG")]
+    pub(crate) output: Option<PathBuf>,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write a page with pictures; opens offline in any browser.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) html: Option<PathBuf>,
+}

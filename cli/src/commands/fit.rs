@@ -1,0 +1,111 @@
+//! `loopsight fit`.
+
+use indicatif::ProgressBar;
+use loopsight_core::config::Step;
+use loopsight_diagnosis::{Fit, FitSettings, Method, Scheme, fit};
+use loopsight_report::{Context, fit_page, save};
+
+use crate::arguments::{FitOptions, MethodName, SchemeName};
+use crate::failure::Failure;
+use crate::load::{Loaded, model_and_log, recording, refuse_fatal, save_text};
+use crate::{output, progress};
+
+pub(crate) fn run(options: &FitOptions) -> Result<(), Failure> {
+    let loaded = model_and_log(&options.files)?;
+    refuse_fatal(&loaded.log_path, &loaded.faults)?;
+    let mut faults = loaded.faults.clone();
+    let test = match &options.test {
+        None => None,
+        Some(path) => {
+            let mut model = loaded.model.clone();
+            let (runs, test_faults) = recording(&mut model, path)?;
+            if model.measured != loaded.model.measured {
+                return Err(Failure::request(format!(
+                    "{} does not measure the same signals as {}",
+                    path.display(),
+                    loaded.log_path.display()
+                )));
+            }
+            faults.extend(test_faults);
+            Some(runs)
+        }
+    };
+    let settings = FitSettings {
+        method: match options.method {
+            MethodName::Rls => Method::Rls,
+            MethodName::OutputError => Method::OutputError,
+        },
+        scheme: match options.regression {
+            SchemeName::Euler => Scheme::Euler,
+            SchemeName::Integrated => Scheme::Integrated,
+        },
+        ..FitSettings::default()
+    };
+    let bar = watch("fitting");
+    let result = fit::fit(&loaded.model, &loaded.runs, test.as_deref(), &faults, &settings, &|i, e| {
+        bar.set_message(match settings.method {
+            Method::OutputError => format!("iteration {i}, error {}", output::percent(e)),
+            Method::Rls => format!("{} of the samples", output::percent(e)),
+        });
+    });
+    bar.finish_and_clear();
+    let result = result?;
+
+    output::people(&text(options, &result), options.json);
+    if options.json {
+        output::json(&result)?;
+    }
+    if let Some(path) = &options.output {
+        save_text(path, &fitted_text(&loaded, &result))?;
+    }
+    if let Some(path) = &options.html {
+        save(path, &fit_page(&context(options, &loaded), &result))?;
+        output::note(&format!("wrote {}", path.display()));
+    }
+    Ok(())
+}
+
+/// A spinner that shows how far a fit has come.
+pub(crate) fn watch(what: &str) -> ProgressBar {
+    progress::spinner(what)
+}
+
+fn text(options: &FitOptions, fit: &Fit) -> String {
+    let judged = match &options.test {
+        Some(path) => format!("\non {}, which it was not fitted to:\n", path.display()),
+        None => "\n".to_owned(),
+    };
+    format!("{}\n{judged}{}", output::fit(fit), output::comparison(&fit.comparison))
+}
+
+/// The model file with the values of the fit in it.
+fn fitted_text(loaded: &Loaded, fit: &Fit) -> String {
+    let values: Vec<(Vec<Step>, f64)> = fit
+        .model
+        .parameters
+        .iter()
+        .zip(&loaded.model.parameters)
+        .filter(|(new, old)| old.free && new.value != old.value)
+        .filter_map(|(new, _)| Some((new.path.clone(), new.value?)))
+        .collect();
+    loaded.source.with_values(&values)
+}
+
+fn context(options: &FitOptions, loaded: &Loaded) -> Context {
+    let mut notes = Vec::new();
+    if let Some(test) = &options.test {
+        notes.push(format!(
+            "Pictures and errors are those on {}, which the model was not fitted to.",
+            test.display()
+        ));
+    }
+    let shown = options.test.as_ref().unwrap_or(&loaded.log_path);
+    Context {
+        title: format!("{} fitted to {}", loaded.model.name, loaded.log_path.display()),
+        model_name: loaded.model.name.clone(),
+        model_file: loaded.model_path.as_ref().map(|p| p.display().to_string()),
+        log_file: shown.display().to_string(),
+        notes,
+        command: output::command_line(),
+    }
+}

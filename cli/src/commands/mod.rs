@@ -1,0 +1,10 @@
+//! One file per command.
+
+pub(crate) mod check;
+pub(crate) mod compare;
+pub(crate) mod completions;
+pub(crate) mod explain;
+pub(crate) mod fit;
+pub(crate) mod list;
+pub(crate) mod run;
+pub(crate) mod simulate;

@@ -1,0 +1,161 @@
+//! Results as text and as JSON.
+
+use std::io::Write as _;
+
+use loopsight_diagnosis::{Comparison, Fit};
+use loopsight_recordings::{Fault, Severity};
+use serde::Serialize;
+
+use crate::failure::Failure;
+
+/// Something for the person at the terminal that is not the result: standard error.
+pub(crate) fn note(text: &str) {
+    eprintln!("{text}");
+}
+
+/// The result: standard output. A closed pipe is not an error.
+pub(crate) fn result(text: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(text.as_bytes());
+    let _ = out.write_all(b"\n");
+}
+
+/// The result as JSON, and nothing else, on standard output.
+pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| Failure::work(e.to_string()))?;
+    result(&text);
+    Ok(())
+}
+
+/// Text for people: to standard output, or to standard error when that is taken by JSON.
+pub(crate) fn people(text: &str, json: bool) {
+    if json { note(text) } else { result(text) }
+}
+
+/// A table with columns aligned: the first to the left, the others to the right.
+pub(crate) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
+    let mut widths: Vec<usize> = head.iter().map(|h| h.chars().count()).collect();
+    for row in rows {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = (*width).max(cell.chars().count());
+        }
+    }
+    let line = |cells: Vec<&str>| {
+        let mut text = String::new();
+        for (i, (cell, width)) in cells.iter().zip(&widths).enumerate() {
+            let gap = " ".repeat(width - cell.chars().count());
+            if i == 0 {
+                text.push_str(&format!("  {cell}{gap}"));
+            } else {
+                text.push_str(&format!("  {gap}{cell}"));
+            }
+        }
+        text.trim_end().to_owned()
+    };
+    let mut lines = vec![line(head.to_vec())];
+    for row in rows {
+        lines.push(line(row.iter().map(String::as_str).collect()));
+    }
+    lines.join("\n")
+}
+
+/// Six significant digits, without needless zeros.
+pub(crate) fn number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let magnitude = value.abs().log10().floor();
+    if !(-4.0..7.0).contains(&magnitude) {
+        return format!("{value:.4e}");
+    }
+    let decimals = (5.0 - magnitude).max(0.0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+/// Per cent with a sensible number of digits.
+pub(crate) fn percent(value: f64) -> String {
+    if value.is_nan() { "-".to_owned() } else { format!("{:.2} %", 100.0 * value) }
+}
+
+pub(crate) fn faults(faults: &[Fault]) -> String {
+    let mut text = String::new();
+    for fault in faults {
+        let word = match fault.severity() {
+            Severity::Note => "note",
+            Severity::Warning => "warning",
+            Severity::Fatal => "fault",
+        };
+        text.push_str(&format!("{word}: {fault}\n"));
+    }
+    text
+}
+
+pub(crate) fn comparison(comparison: &Comparison) -> String {
+    let rows: Vec<Vec<String>> = comparison
+        .signals
+        .iter()
+        .map(|s| {
+            vec![
+                s.id.clone(),
+                format!("{} {}", number(s.rmse), s.unit),
+                percent(s.nrmse),
+                format!("{:.2} %", s.fit_percent),
+                percent(s.one_step_nrmse),
+            ]
+        })
+        .collect();
+    format!(
+        "{}free run: error {} of the standard deviation, fit {:.2} %\n{}",
+        faults(&comparison.faults),
+        percent(comparison.nrmse),
+        comparison.fit_percent,
+        table(&["signal", "rmse", "nrmse", "fit", "one-step nrmse"], &rows)
+    )
+}
+
+pub(crate) fn fit(fit: &Fit) -> String {
+    let rows: Vec<Vec<String>> = fit
+        .parameters
+        .iter()
+        .map(|(name, p)| {
+            vec![
+                name.clone(),
+                number(p.value),
+                p.unit.clone(),
+                p.std_error.map_or_else(|| "-".to_owned(), |e| format!("{e:.2e}")),
+                p.interval95.map_or_else(
+                    || "-".to_owned(),
+                    |[low, high]| format!("{} … {}", number(low), number(high)),
+                ),
+                p.verdict.text().to_owned(),
+            ]
+        })
+        .collect();
+    let mut text = table(
+        &["parameter", "value", "unit", "std error", "95 % interval", "verdict"],
+        &rows,
+    );
+    for flat in &fit.flat {
+        text.push_str(&format!("\nnot determined: {flat}"));
+    }
+    text.push_str(&format!(
+        "\n\nerror on the fitted log: {}{}",
+        fit.nrmse_before.map_or_else(String::new, |b| format!("{} before, ", percent(b))),
+        percent(fit.nrmse_fit)
+    ));
+    text
+}
+
+/// The command as it was typed, for the foot of a page.
+pub(crate) fn command_line() -> String {
+    let words: Vec<String> = std::env::args()
+        .skip(1)
+        .map(|w| if w.contains(' ') { format!("'{w}'") } else { w })
+        .collect();
+    format!("loopsight {}", words.join(" "))
+}
