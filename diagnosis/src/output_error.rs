@@ -46,8 +46,10 @@ pub(crate) fn fit(
 ) -> Result<Fit, FitError> {
     let mut problem = Problem::new(model, runs, progress)?;
     let start = problem.start(settings)?;
+    let start = problem.balance(start);
     let mut solution = problem.solve(&start, settings.max_iterations)?;
     if let Some(start) = problem.whiten(&solution) {
+        let start = problem.balance(start);
         solution = problem.solve(&start, settings.max_iterations)?;
     }
     Ok(problem.result(&solution))
@@ -220,6 +222,23 @@ impl<'a> Problem<'a> {
             .clone()
             .resize_vertically(self.scales.len(), f64::INFINITY);
         Some(solution.clone().resize_vertically(self.scales.len(), 0.0))
+    }
+
+    /// Scales the unknowns so that each moves the residuals alike, as the damping of the solver
+    /// expects (J. J. Moré, 1978, "The Levenberg-Marquardt algorithm", section 6).
+    fn balance(&mut self, mut scaled: DVector<f64>) -> DVector<f64> {
+        let (_, jacobian) = self.linearise(&scaled);
+        for (i, column) in jacobian.column_iter().enumerate() {
+            let norm = column.norm();
+            if norm > DEAD && norm.is_finite() {
+                self.scales[i] /= norm;
+                self.lower[i] *= norm;
+                self.upper[i] *= norm;
+                scaled[i] *= norm;
+            }
+        }
+        self.cache.replace(None);
+        scaled
     }
 
     /// First of the unknowns `ε` before the runs.
@@ -483,7 +502,18 @@ const DEAD: f64 = 1e-9;
 impl Flatness {
     fn of(problem: &Problem<'_>, gram: &DMatrix<f64>, norms: &[f64]) -> Self {
         let n = norms.len();
-        let dead: Vec<bool> = norms.iter().map(|norm| !(*norm > DEAD)).collect();
+        // The unknowns are balanced: a dead one is dead on the scale of its declaration.
+        let dead: Vec<bool> = norms
+            .iter()
+            .enumerate()
+            .map(|(i, norm)| {
+                let natural = problem.free.get(i).map_or(1.0, |p| {
+                    let declared = problem.model.parameters[*p].declaration.scale;
+                    declared / problem.scales[i]
+                });
+                !(*norm * natural > DEAD)
+            })
+            .collect();
         let mut normalised = gram.clone();
         for i in 0..n {
             for j in 0..n {
