@@ -1,1 +1,35 @@
-//! placeholder
+//! What a person looks at: pages that show a model against measurements, a fit, or a loop at work.
+//!
+//! [`comparison_page`], [`fit_page`] and [`run_page`] return the text of an HTML file that needs
+//! nothing but a browser: style, data and the charts' library (plotly.js) are inside, nothing is
+//! fetched. [`save`] writes it whole or not at all. [`figure_svg`] draws static pictures for texts.
+//!
+//! Numbers are thinned out and rounded for drawing only; what a page *says* is computed from every
+//! sample.
+
+mod chart;
+mod comparison;
+mod errors;
+mod figure;
+mod fit;
+mod html;
+mod intervals;
+mod numbers;
+mod page;
+mod record;
+mod run;
+mod save;
+mod scatter;
+mod thin;
+mod words;
+
+#[cfg(test)]
+mod fixtures;
+
+pub use comparison::comparison_page;
+pub use figure::{Figure, FigurePanel, FigureTrace, Style, figure_svg};
+pub use fit::fit_page;
+pub use page::Context;
+pub use record::{ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace};
+pub use run::run_page;
+pub use save::{ReportError, save};

@@ -1,0 +1,162 @@
+"use strict";
+// Draws the charts of a page (chart.rs says what they hold) with plotly.js when they come into view.
+(() => {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const coarse = matchMedia("(pointer: coarse)");
+  // Okabe and Ito's colours, lighter on dark ground.
+  const themes = {
+    light: {
+      ink: "#1d2126", soft: "#59616b", paper: "#ffffff", grid: "#e6e9ed", zero: "#aab2bc", shade: "rgba(213,94,0,.16)",
+      measured: "#555b63", commanded: "#555b63", model: "#d55e00", one_step: "#c0588f", reference: "#008f6b", residual: "#7d3f98",
+      points: "rgba(85,91,99,.28)", mean: "#d55e00", series: ["#0072b2", "#c98300", "#008f6b", "#c0588f"],
+    },
+    dark: {
+      ink: "#e4e7eb", soft: "#a3abb5", paper: "#1c2025", grid: "#2c3239", zero: "#5a636e", shade: "rgba(255,157,77,.22)",
+      measured: "#b9c0c9", commanded: "#b9c0c9", model: "#ff9d4d", one_step: "#e79ac4", reference: "#3dd6a3", residual: "#cf9ae8",
+      points: "rgba(185,192,201,.28)", mean: "#ff9d4d", series: ["#6bb7f0", "#f0c04a", "#3dd6a3", "#e79ac4"],
+    },
+  };
+  const dashes = ["solid", "dot", "dash", "dashdot"];
+  const title = 34, bottom = 40; // as in chart.rs
+  const font = "system-ui, sans-serif";
+
+  function traces(chart, theme) {
+    const out = [];
+    chart.panels.forEach((panel, at) => {
+      const yaxis = at ? `y${at + 1}` : "y";
+      let series = 0;
+      for (const trace of panel.traces) {
+        const nth = trace.role === "series" ? series++ % 4 : 0;
+        const color = trace.role === "series" ? theme.series[nth] : theme[trace.role];
+        const x = trace.x ?? chart.times;
+        const common = { x, yaxis, xaxis: "x", entry: trace.role + trace.name, visible: !trace.hidden };
+        if (trace.spread && trace.role !== "mean") {
+          const edge = sign => trace.y.map((y, k) => y === null || trace.spread[k] === null ? null : y + sign * trace.spread[k]);
+          const band = { ...common, mode: "lines", line: { width: 0 }, hoverinfo: "skip" };
+          out.push({ ...band, y: edge(-1) }, { ...band, y: edge(1), fill: "tonexty", fillcolor: theme.shade });
+        }
+        const drawn = { ...common, y: trace.y, name: escape(panel.of ? `${panel.of}, ${trace.name}` : trace.name), label: trace.name, color };
+        if (trace.role === "points") {
+          Object.assign(drawn, { type: "scatter", mode: "markers", marker: { color, size: 3 }, hoverinfo: "skip" });
+        } else {
+          const width = trace.role === "measured" ? 1.3 : 1.7;
+          drawn.mode = trace.role === "mean" ? "lines+markers" : "lines";
+          drawn.line = { color, width, dash: trace.role === "commanded" ? "dot" : dashes[nth], shape: trace.step ? "hv" : "linear" };
+          drawn.marker = { color, size: 6 };
+          drawn.hovertemplate = "%{y:.5~g}";
+        }
+        if (trace.role === "mean") {
+          drawn.error_y = { type: "data", array: trace.spread, color, thickness: 1, width: 3 };
+          drawn.hovertemplate = "%{y:.3~g} ± %{error_y.array:.2~g}<extra></extra>";
+        }
+        out.push(drawn);
+      }
+    });
+    return out;
+  }
+
+  function layout(chart, theme) {
+    const height = chart.panels.reduce((sum, p) => sum + p.height + title, 0);
+    const top = chart.events ? 22 : 0;
+    const out = {
+      height: height + top + bottom, margin: { l: 52, r: 12, t: top, b: bottom }, showlegend: false,
+      paper_bgcolor: theme.paper, plot_bgcolor: theme.paper, font: { family: font, size: 12, color: theme.soft },
+      dragmode: coarse.matches ? false : "zoom", hovermode: "x unified", hoversubplots: "axis", annotations: [], shapes: [],
+      hoverlabel: { bgcolor: theme.paper, bordercolor: theme.zero, font: { color: theme.ink, family: font, size: 12 } },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: theme.soft, activecolor: theme.ink },
+      xaxis: {
+        gridcolor: theme.grid, linecolor: theme.zero, zeroline: false, anchor: chart.panels.length > 1 ? `y${chart.panels.length}` : "y",
+        title: { text: escape(chart.x_title), standoff: 4 }, hoverformat: ".5~g", ticks: "outside", ticklen: 3, tickcolor: theme.zero,
+        showspikes: true, spikethickness: 1, spikedash: "dot", spikecolor: theme.zero, spikemode: "across",
+      },
+    };
+    let from = 0;
+    chart.panels.forEach((panel, at) => {
+      const high = 1 - (from + title) / height, low = 1 - (from + title + panel.height) / height;
+      from += panel.height + title;
+      const axis = at ? `yaxis${at + 1}` : "yaxis";
+      out[axis] = {
+        domain: [Math.max(low, 0), high], gridcolor: theme.grid, zerolinecolor: theme.zero, zerolinewidth: 1, nticks: panel.height > 150 ? 7 : 4,
+        anchor: "x", ticks: "", automargin: true, ...(panel.range && { range: panel.range }),
+      };
+      out.annotations.push({
+        text: escape(panel.title), xref: "paper", yref: "paper", x: 0, y: high, xanchor: "left", yanchor: "bottom", showarrow: false,
+        font: { size: 13, color: theme.ink }, xshift: -44, yshift: 6,
+      });
+      for (const [x0, x1] of panel.shaded ?? []) {
+        out.shapes.push({ type: "rect", x0, x1, yref: `${at ? `y${at + 1}` : "y"} domain`, y0: 0, y1: 1, fillcolor: theme.shade, line: { width: 0 }, layer: "below" });
+      }
+    });
+    (chart.events ?? []).forEach((x, at) => {
+      chart.panels.forEach((_, k) => out.shapes.push({
+        type: "line", x0: x, x1: x, yref: `${k ? `y${k + 1}` : "y"} domain`, y0: 0, y1: 1, line: { color: theme.soft, width: 1, dash: "dash" },
+      }));
+      out.annotations.push({ text: String(at + 1), x, yref: "paper", y: 1, yanchor: "bottom", showarrow: false, font: { size: 11, color: theme.ink } });
+    });
+    return out;
+  }
+
+  // Plotly reads a little HTML in titles: names shall be taken literally.
+  const escape = text => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+
+  function legend(div, drawn) {
+    const entries = new Map();
+    drawn.forEach((trace, k) => {
+      const entry = entries.get(trace.entry) ?? { traces: [] };
+      entry.traces.push(k);
+      if (trace.label !== undefined) Object.assign(entry, { trace });
+      entries.set(trace.entry, entry);
+    });
+    const box = div.parentElement.querySelector(".legend");
+    if (!box) return;
+    box.replaceChildren();
+    for (const { traces, trace } of entries.values()) {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.setAttribute("aria-pressed", String(trace.visible));
+      const dash = { dot: "2 3", dash: "7 4", dashdot: "7 3 2 3" }[trace.line?.dash] ?? "";
+      button.innerHTML = trace.mode === "markers"
+        ? `<svg width="12" height="10"><circle cx="6" cy="5" r="3" fill="${trace.color}"/></svg>`
+        : `<svg width="22" height="10"><path d="M1 5H21" stroke="${trace.color}" stroke-width="3" stroke-dasharray="${dash}"/></svg>`;
+      button.append(trace.label);
+      button.onclick = () => {
+        const visible = button.getAttribute("aria-pressed") !== "true";
+        button.setAttribute("aria-pressed", String(visible));
+        Plotly.restyle(div, { visible }, traces);
+      };
+      box.append(button);
+    }
+  }
+
+  function draw(div) {
+    div.chart ??= JSON.parse(div.querySelector("script").textContent);
+    const theme = dark.matches ? themes.dark : themes.light;
+    const drawn = traces(div.chart, theme);
+    const config = {
+      responsive: true, displaylogo: false, displayModeBar: div.chart.small ? false : coarse.matches ? true : "hover",
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+    };
+    Plotly.react(div, drawn, layout(div.chart, theme), config);
+    legend(div, drawn);
+    div.drawn = true;
+  }
+
+  const seen = new IntersectionObserver(entries => {
+    for (const entry of entries) {
+      if (entry.isIntersecting && !entry.target.drawn) draw(entry.target);
+    }
+  }, { rootMargin: "400px" });
+  const charts = [...document.querySelectorAll(".chart")];
+  charts.forEach(div => seen.observe(div));
+  dark.addEventListener("change", () => charts.filter(div => div.drawn).forEach(draw));
+
+  const runs = [...document.querySelectorAll(".run")];
+  const buttons = [...document.querySelectorAll("button[data-run]")];
+  const choose = at => {
+    runs.forEach((run, k) => { run.hidden = k !== at; });
+    buttons.forEach((button, k) => button.setAttribute("aria-pressed", String(k === at)));
+    runs[at].querySelectorAll(".chart").forEach(div => { if (!div.drawn) draw(div); });
+  };
+  buttons.forEach((button, at) => { button.onclick = () => choose(at); });
+  if (runs.length) choose(0);
+})();

@@ -1,0 +1,89 @@
+//! Text into HTML, safely.
+
+/// `text` as HTML text or as the value of a quoted attribute.
+pub(crate) fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            _ => out.push(c),
+        }
+    }
+    out
+}
+
+/// As [`escape`], and a long identifier may break into lines after its underscores and dots.
+pub(crate) fn identifier(text: &str) -> String {
+    escape(text).replace('_', "_<wbr>").replace('.', ".<wbr>")
+}
+
+/// JSON that can stand inside a `<script>` element: no `<` can end it.
+pub(crate) fn json(value: &impl serde::Serialize) -> String {
+    // Plain data of numbers and texts always serialises.
+    serde_json::to_string(value)
+        .unwrap_or_else(|_| "null".into())
+        .replace('<', "\\u003c")
+}
+
+/// A table; `numeric` columns are aligned to the right. Cells are HTML.
+pub(crate) fn table(header: &[&str], numeric: &[bool], rows: &[Vec<String>]) -> String {
+    let class = |column: usize| match numeric.get(column) {
+        Some(true) => " class=\"number\"",
+        _ => "",
+    };
+    let mut out = String::from("<div class=\"wide\"><table><thead><tr>");
+    for (column, title) in header.iter().enumerate() {
+        out.push_str(&format!("<th{}>{}</th>", class(column), escape(title)));
+    }
+    out.push_str("</tr></thead><tbody>");
+    for row in rows {
+        out.push_str("<tr>");
+        for (column, cell) in row.iter().enumerate() {
+            out.push_str(&format!("<td{}>{cell}</td>", class(column)));
+        }
+        out.push_str("</tr>");
+    }
+    out.push_str("</tbody></table></div>\n");
+    out
+}
+
+/// A list of sentences; nothing when there are none.
+pub(crate) fn list(sentences: &[String]) -> String {
+    if sentences.is_empty() {
+        return String::new();
+    }
+    let items: String = sentences
+        .iter()
+        .map(|s| format!("<li>{}</li>", escape(s)))
+        .collect();
+    format!("<ul>{items}</ul>\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_breaks_out() {
+        assert_eq!(escape("a<b>&\"c'"), "a&lt;b&gt;&amp;&quot;c&#39;");
+        assert_eq!(json(&"</script><!--"), "\"\\u003c/script>\\u003c!--\"");
+        assert_eq!(json(&[f64::NAN, 1.5]), "[null,1.5]");
+        assert_eq!(identifier("a_b.c<"), "a_<wbr>b.<wbr>c&lt;");
+        assert_eq!(list(&["<x>".into()]), "<ul><li>&lt;x&gt;</li></ul>\n");
+    }
+
+    #[test]
+    fn a_table_aligns_its_numbers() {
+        let text = table(
+            &["signal", "rms"],
+            &[false, true],
+            &[vec!["v".into(), "1".into()]],
+        );
+        assert!(text.contains("<th class=\"number\">rms</th>"));
+        assert!(text.contains("<td>v</td><td class=\"number\">1</td>"));
+    }
+}

@@ -1,0 +1,255 @@
+//! The page of a loop at work.
+
+use crate::chart::{Chart, Role};
+use crate::errors::rms;
+use crate::html::{escape, identifier, list, table};
+use crate::numbers::{axis, percent, plain, quantity, show};
+use crate::page::{Context, page, section};
+use crate::record::LoopRecord;
+
+/// Lines for events; more would hide the traces.
+const MOST_EVENTS: usize = 60;
+
+/// The page of a closed loop: references, measurements and the response the design promises, the
+/// inputs with saturation, what the estimator learned, and what happened.
+pub fn run_page(context: &Context, record: &LoopRecord) -> String {
+    let mut body = format!("<p class=\"verdict\">{}</p>\n", escape(&sentence(record)));
+    body.push_str(&list(&record.notes));
+    body.push_str(&scores(record));
+    body.push_str(&section(
+        "Over time",
+        "Drag across a chart to zoom in, double-click to see all again; a tap on a legend entry \
+         shows or hides it. Shaded: the controller wanted more than it could get.",
+        &over_time(record).html(),
+    ));
+    body.push_str(&events(record));
+    if !record.parameters.is_empty() || !record.innovations.is_empty() {
+        body.push_str(&section(
+            "What the estimator learned",
+            "Parameters with a band of ± 2 standard deviations; below them the innovation: what \
+             each measurement told that was not expected. Wild first guesses may be out of sight: \
+             double-click to see all.",
+            &estimator(record).html(),
+        ));
+    }
+    page(context, &body)
+}
+
+fn sentence(record: &LoopRecord) -> String {
+    let n = record.time.len();
+    if n == 0 {
+        return with_end("The loop did not complete a single tick.".into(), record);
+    }
+    let duration = record.time[n - 1] - record.time[0];
+    let mut text = format!(
+        "The loop ran for {} in {n} ticks of {}.",
+        quantity(&plain(duration), "s"),
+        quantity(&plain(1000.0 * record.period_s), "ms"),
+    );
+    let saturated = record.saturated.iter().take(n).filter(|s| **s).count();
+    text.push_str(&match saturated {
+        0 => " The inputs never saturated.".to_owned(),
+        _ => format!(
+            " The inputs were saturated {} of the time.",
+            percent(saturated as f64 / n as f64)
+        ),
+    });
+    with_end(text, record)
+}
+
+fn with_end(text: String, record: &LoopRecord) -> String {
+    let end = record.end.trim().trim_end_matches('.');
+    if end.is_empty() {
+        text
+    } else {
+        format!("{text} It ended: {end}.")
+    }
+}
+
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// How far each signal was from its reference and from the promised response.
+fn scores(record: &LoopRecord) -> String {
+    if record.controlled.is_empty() {
+        return String::new();
+    }
+    let ideal = record.controlled.iter().any(|c| c.ideal.is_some());
+    let rows: Vec<Vec<String>> = record
+        .controlled
+        .iter()
+        .map(|c| {
+            let error = |of: &[f64]| {
+                escape(&quantity(
+                    &show(rms(difference(of, &c.measured)), 3),
+                    &c.unit,
+                ))
+            };
+            let mut row = vec![identifier(&c.id), error(&c.reference)];
+            if ideal {
+                row.push(c.ideal.as_deref().map_or_else(|| "–".into(), error));
+            }
+            row
+        })
+        .collect();
+    let header = [
+        "signal",
+        "from the reference (rms)",
+        "from the ideal response (rms)",
+    ];
+    table(
+        &header[..if ideal { 3 } else { 2 }],
+        &[false, true, true],
+        &rows,
+    )
+}
+
+fn over_time(record: &LoopRecord) -> Chart {
+    let mut chart = Chart::over_time(&record.time);
+    for c in &record.controlled {
+        chart.panel_of(&c.id, axis(&c.id, &c.unit), 200);
+        chart.line("measured", Role::Measured, &c.measured);
+        if let Some(ideal) = &c.ideal {
+            chart.line("ideal response", Role::Model, ideal);
+        }
+        if let Some(trace) = chart.line("reference", Role::Reference, &c.reference) {
+            trace.step = true;
+        }
+        let title = axis(&format!("tracking error of {}", c.id), &c.unit);
+        chart.panel_of(&c.id, title, 110);
+        chart.line(
+            "tracking error",
+            Role::Residual,
+            &difference(&c.reference, &c.measured),
+        );
+    }
+    for input in &record.inputs {
+        chart.panel_of(&input.id, axis(&input.id, &input.unit), 120);
+        let applied = if input.applied.is_empty() {
+            &input.commanded
+        } else {
+            &input.applied
+        };
+        for (name, role, values) in [
+            ("commanded", Role::Commanded, &input.commanded),
+            ("applied", Role::Series, applied),
+        ] {
+            if let Some(trace) = chart.line(name, role, values) {
+                trace.step = true;
+            }
+        }
+        chart.shade(&record.saturated);
+    }
+    chart.events = record
+        .events
+        .iter()
+        .take(MOST_EVENTS)
+        .map(|e| e.0)
+        .collect();
+    chart
+}
+
+fn estimator(record: &LoopRecord) -> Chart {
+    let mut chart = Chart::over_time(&record.time);
+    for p in &record.parameters {
+        chart.panel_of(&p.name, axis(&p.name, &p.unit), 110);
+        let two_sigma: Option<Vec<f64>> = p
+            .std
+            .as_ref()
+            .map(|std| std.iter().map(|s| 2.0 * s).collect());
+        chart.band("estimate", Role::Model, &p.values, two_sigma.as_deref());
+        chart.settle();
+    }
+    for i in &record.innovations {
+        let title = axis(&format!("innovation of {}", i.id), &i.unit);
+        chart.panel_of(&i.id, title, 110);
+        chart.line("innovation", Role::Residual, &i.values);
+        chart.settle();
+    }
+    chart.events = record
+        .events
+        .iter()
+        .take(MOST_EVENTS)
+        .map(|e| e.0)
+        .collect();
+    chart
+}
+
+/// The numbered lines of the charts, in words.
+fn events(record: &LoopRecord) -> String {
+    if record.events.is_empty() {
+        return String::new();
+    }
+    let rows: Vec<Vec<String>> = record
+        .events
+        .iter()
+        .take(MOST_EVENTS)
+        .enumerate()
+        .map(|(at, (time, text))| {
+            vec![
+                (at + 1).to_string(),
+                quantity(&format!("{time:.2}"), "s"),
+                escape(text),
+            ]
+        })
+        .collect();
+    let more = match record.events.len().saturating_sub(MOST_EVENTS) {
+        0 => String::new(),
+        more => format!("<p>And {more} more.</p>\n"),
+    };
+    let table = table(&["", "time", "what happened"], &[true, true, false], &rows);
+    section("Events", "Numbered lines in the charts.", &(table + &more))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{context, loop_record, without_library};
+
+    #[test]
+    fn the_page_says_and_shows() {
+        let record = loop_record(1000);
+        let page = without_library(&run_page(&context(), &record));
+        for text in [
+            "The loop ran for 9.99\u{a0}s in 1000 ticks of 10\u{a0}ms.",
+            "The inputs were saturated",
+            "It ended: the reference ended.",
+            "Settling time asked for 0.45 s",
+            "tracking error of linear_velocity, m/s",
+            "\"shaded\":[[",
+            "\"spread\":[",
+            "innovation of linear_velocity, m/s²",
+            "estimator reset: covariance lost",
+            "\"events\":[3.2,7.7]",
+        ] {
+            assert!(page.contains(text), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_empty_record_is_a_page() {
+        let page = run_page(&context(), &LoopRecord::default());
+        assert!(page.contains("did not complete a single tick") && page.contains("</html>"));
+    }
+
+    #[test]
+    fn series_of_any_length_are_no_panic() {
+        let mut record = loop_record(100);
+        record.saturated.truncate(3);
+        record.controlled[0].measured.truncate(7);
+        record.controlled[1].ideal = None;
+        record.inputs[0].applied.clear();
+        record.parameters[0].std = Some(vec![1.0]);
+        record.events = (0..100)
+            .map(|k| (f64::from(k), "</script>".into()))
+            .collect();
+        let page = run_page(&context(), &record);
+        assert!(page.contains("And 40 more."));
+        let page = without_library(&page);
+        assert_eq!(
+            page.matches("<script").count(),
+            page.matches("</script>").count()
+        );
+    }
+}
