@@ -202,7 +202,7 @@ impl Chart {
         let (all, late) = (span(0.0), span(0.2));
         let height = late[1] - late[0];
         let room = (0.5 * height).max(0.1 * late[0].abs().max(late[1].abs()));
-        if height.is_finite() && room > 0.0 && all[1] - all[0] > 4.0 * (height + 2.0 * room) {
+        if height.is_finite() && room > 0.0 && all[1] - all[0] > 10.0 * (height + 2.0 * room) {
             panel.range = Some([late[0] - room, late[1] + room].map(|v| significant(v, 3)));
         }
     }
