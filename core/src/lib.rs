@@ -56,7 +56,7 @@ pub use controller::{AffineModel, Command, ControlError, Controller};
 pub use driver::{Driver, DriverError, DriverFault, Sample};
 pub use effect::{Effect, EffectMeta, NoPast, Past, Physics, Reading};
 pub use estimator::{Estimator, Innovation};
-pub use integrator::{Rk4, substeps};
+pub use integrator::{Rk4, rk4_step, substeps};
 pub use parameter::Parameter;
 #[doc(hidden)]
 pub use plant::check_sizes as plant_check;

@@ -89,6 +89,9 @@ pub trait ControlAffine<const M: usize, const NU: usize, const NP: usize> {
 pub trait Dynamics<S: Real>: Send + Sync {
     /// `dx = f(x, u, w; p)`.
     fn derivative(&self, x: &[S], u: &[S], w: &[S], p: &[S], dx: &mut [S]);
+    /// One step `h` (s) of the plant alone by [`Rk4`](crate::Rk4), inputs and efforts held: what
+    /// that does with [`Dynamics::derivative`], to the last digit, without a call per stage.
+    fn step(&self, x: &mut [S], h: S, u: &[S], w: &[S], p: &[S]);
     /// `y = h(x, u; p)`.
     fn outputs(&self, x: &[S], u: &[S], p: &[S], y: &mut [S]);
     /// Parameters of the equations from the values the file gives (set 0 is the equations' own,
@@ -152,6 +155,19 @@ macro_rules! declare_plant {
                 for (to, from) in dx.iter_mut().zip(rate) {
                     *to = from;
                 }
+            }
+            fn step(&self, x: &mut [S], h: S, u: &[S], w: &[S], p: &[S]) {
+                let (Ok(x), Ok(u), Ok(w), Ok(p)) = (
+                    <&mut [S; $nx]>::try_from(x),
+                    u.try_into(),
+                    w.try_into(),
+                    p.try_into(),
+                ) else {
+                    return;
+                };
+                $crate::rk4_step(x, h, |x| {
+                    <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::derivative(x, u, w, p)
+                });
             }
             fn outputs(&self, x: &[S], u: &[S], p: &[S], y: &mut [S]) {
                 let (Ok(x), Ok(u), Ok(p)) = (x.try_into(), u.try_into(), p.try_into()) else {

@@ -392,6 +392,11 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         let model: &Model = model;
         let nx = model.n_states();
         let dynamics = S::dynamics(model.dynamics);
+        if inputs.is_empty() && efforts.is_empty() && bodies.is_empty() && means.is_empty() {
+            // Nothing acts on the plant within the step (`w` stays zero): half the time.
+            dynamics.step(&mut x[..nx], S::of(h), &scratch.held, &scratch.w, p);
+            return;
+        }
         rk4.step(x, S::of(h), |stage, x, dx| {
             let time = from + h * [0.0, 0.5, 0.5, 1.0][stage];
             let plant_x = &x[..nx];
