@@ -19,12 +19,18 @@ pub(crate) struct Failure {
 impl Failure {
     /// The request or a file is wrong.
     pub(crate) fn request(text: impl Into<String>) -> Self {
-        Self { status: 2, text: format!("error: {}", text.into()) }
+        Self {
+            status: 2,
+            text: format!("error: {}", text.into()),
+        }
     }
 
     /// The work failed.
     pub(crate) fn work(text: impl Into<String>) -> Self {
-        Self { status: 1, text: format!("error: {}", text.into()) }
+        Self {
+            status: 1,
+            text: format!("error: {}", text.into()),
+        }
     }
 
     pub(crate) fn status(&self) -> u8 {
@@ -52,14 +58,20 @@ impl Failure {
             .with_source_code(NamedSource::new(file, text.to_owned()));
         let colours = std::io::IsTerminal::is_terminal(&std::io::stderr())
             && std::env::var_os("NO_COLOR").is_none();
-        let theme =
-            if colours { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
+        let theme = if colours {
+            GraphicalTheme::unicode()
+        } else {
+            GraphicalTheme::unicode_nocolor()
+        };
         let mut shown = String::new();
         let handler = GraphicalReportHandler::new_themed(theme).with_context_lines(1);
         if handler.render_report(&mut shown, report.as_ref()).is_err() {
             shown = format!("{file}: {message}");
         }
-        Self { status: 2, text: shown }
+        Self {
+            status: 2,
+            text: shown,
+        }
     }
 }
 
@@ -119,9 +131,15 @@ impl From<FitError> for Failure {
 /// An error in a log, with the line shown where there is one.
 pub(crate) fn recording(path: &Path, error: &RecordingError) -> Failure {
     let message = error.to_string();
-    let Some((line, field)) = place(error) else { return Failure::request(message) };
-    let Ok(text) = std::fs::read_to_string(path) else { return Failure::request(message) };
-    let Some(found) = text.lines().nth(line - 1) else { return Failure::request(message) };
+    let Some((line, field)) = place(error) else {
+        return Failure::request(message);
+    };
+    let Ok(text) = std::fs::read_to_string(path) else {
+        return Failure::request(message);
+    };
+    let Some(found) = text.lines().nth(line - 1) else {
+        return Failure::request(message);
+    };
     let start = found.as_ptr() as usize - text.as_ptr() as usize;
     let mut span = start..start + found.len();
     if let Some(field) = field {
@@ -144,7 +162,7 @@ fn place(error: &RecordingError) -> Option<(usize, Option<usize>)> {
             Some((*line, None))
         }
         RecordingError::DuplicateColumn { line, second, .. } => Some((*line, Some(*second))),
-        RecordingError::MissingValue { at, .. } | RecordingError::Absurd { at, .. } => {
+        RecordingError::MissingValue { at, .. } | RecordingError::AbsurdValue { at, .. } => {
             at.line.map(|line| (line, Some(at.column_number)))
         }
         _ => None,

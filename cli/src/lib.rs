@@ -36,7 +36,11 @@ pub fn run() -> ExitCode {
             let wrong = error.use_stderr();
             // Help goes to standard output and is no error; a closed pipe is not ours to report.
             let _ = error.print();
-            return if wrong { ExitCode::from(2) } else { ExitCode::SUCCESS };
+            return if wrong {
+                ExitCode::from(2)
+            } else {
+                ExitCode::SUCCESS
+            };
         }
     };
     match execute(&arguments) {

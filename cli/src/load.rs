@@ -57,7 +57,14 @@ pub(crate) fn model_and_log(files: &[PathBuf]) -> Result<Loaded, Failure> {
             let name = format!("model made from {}", log_path.display());
             let (mut model, source) = Model::from_toml(&name, &text)?;
             let (runs, faults) = mapped(&mut model, &log, log_path)?;
-            Ok(Loaded { model, source, model_path: None, log_path: log_path.clone(), runs, faults })
+            Ok(Loaded {
+                model,
+                source,
+                model_path: None,
+                log_path: log_path.clone(),
+                runs,
+                faults,
+            })
         }
         _ => Err(Failure::request("expected a model file and a log")),
     }
@@ -76,8 +83,11 @@ fn mapped(
     path: &Path,
 ) -> Result<(Vec<Run>, Vec<Fault>), Failure> {
     let recording = map(model, log).map_err(|e| failure::recording(path, &e))?;
-    let measured: Vec<_> =
-        recording.measured.iter().map(|m| (m.id.clone(), m.sensor.clone())).collect();
+    let measured: Vec<_> = recording
+        .measured
+        .iter()
+        .map(|m| (m.id.clone(), m.sensor.clone()))
+        .collect();
     model.measure(&measured).map_err(|(_, message, help)| {
         Failure::request(match help {
             Some(help) => format!("{message} ({help})"),
@@ -92,8 +102,13 @@ pub(crate) fn map(
     model: &Model,
     log: &loopsight_recordings::Source,
 ) -> Result<loopsight_recordings::Recording, RecordingError> {
-    let measurable: Vec<Signal> =
-        model.plant.states.iter().chain(model.plant.outputs).copied().collect();
+    let measurable: Vec<Signal> = model
+        .plant
+        .states
+        .iter()
+        .chain(model.plant.outputs)
+        .copied()
+        .collect();
     loopsight_recordings::map(log, model.plant.inputs, &measurable, &model.log)
 }
 
@@ -140,7 +155,9 @@ pub(crate) fn save_text(path: &Path, text: &str) -> Result<(), Failure> {
 fn make_readable(file: &tempfile::NamedTempFile) {
     use std::os::unix::fs::PermissionsExt as _;
     // Worst case the file stays private: no reason to lose it.
-    let _ = file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644));
+    let _ = file
+        .as_file()
+        .set_permissions(std::fs::Permissions::from_mode(0o644));
 }
 
 #[cfg(not(unix))]

@@ -79,7 +79,11 @@ pub(crate) fn number(value: f64) -> String {
 
 /// Per cent with a sensible number of digits.
 pub(crate) fn percent(value: f64) -> String {
-    if value.is_nan() { "-".to_owned() } else { format!("{:.2} %", 100.0 * value) }
+    if value.is_nan() {
+        "-".to_owned()
+    } else {
+        format!("{:.2} %", 100.0 * value)
+    }
 }
 
 pub(crate) fn faults(faults: &[Fault]) -> String {
@@ -127,7 +131,8 @@ pub(crate) fn fit(fit: &Fit) -> String {
                 name.clone(),
                 number(p.value),
                 p.unit.clone(),
-                p.std_error.map_or_else(|| "-".to_owned(), |e| format!("{e:.2e}")),
+                p.std_error
+                    .map_or_else(|| "-".to_owned(), |e| format!("{e:.2e}")),
                 p.interval95.map_or_else(
                     || "-".to_owned(),
                     |[low, high]| format!("{} … {}", number(low), number(high)),
@@ -137,7 +142,14 @@ pub(crate) fn fit(fit: &Fit) -> String {
         })
         .collect();
     let mut text = table(
-        &["parameter", "value", "unit", "std error", "95 % interval", "verdict"],
+        &[
+            "parameter",
+            "value",
+            "unit",
+            "std error",
+            "95 % interval",
+            "verdict",
+        ],
         &rows,
     );
     for flat in &fit.flat {
@@ -145,7 +157,8 @@ pub(crate) fn fit(fit: &Fit) -> String {
     }
     text.push_str(&format!(
         "\n\nerror on the fitted log: {}{}",
-        fit.nrmse_before.map_or_else(String::new, |b| format!("{} before, ", percent(b))),
+        fit.nrmse_before
+            .map_or_else(String::new, |b| format!("{} before, ", percent(b))),
         percent(fit.nrmse_fit)
     ));
     text

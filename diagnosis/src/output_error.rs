@@ -59,6 +59,8 @@ pub(crate) fn fit(
 const ROUNDED: f64 = -0.8;
 /// See [`ROUNDED`].
 const SLOW: f64 = 0.3;
+/// Spans of the regressions that a fit may start from, s.
+const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
 
 struct Problem<'a> {
     model: &'a Model,
@@ -150,17 +152,21 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// The file's values, and those of a regression; whichever runs closer to the data.
+    /// The file's values, and those of regressions; whichever runs closest to the data.
     fn start(&self, settings: &FitSettings) -> Result<DVector<f64>, FitError> {
         let mut candidates = Vec::new();
         if self.model.missing_values().is_empty() {
             candidates.push(self.model.values());
         }
-        let regressed = batch(self.model, self.runs, settings.scheme);
-        match (regressed, candidates.is_empty()) {
-            (Ok(values), _) => candidates.push(values),
-            (Err(error), true) => return Err(error),
-            (Err(_), false) => {}
+        let mut failure = None;
+        for span in SPANS {
+            match batch(self.model, self.runs, settings.scheme, span) {
+                Ok(values) => candidates.push(values),
+                Err(error) => failure = Some(error),
+            }
+        }
+        if let (true, Some(error)) = (candidates.is_empty(), failure) {
+            return Err(error);
         }
         let mut best: Option<(f64, DVector<f64>)> = None;
         for values in candidates {
@@ -396,7 +402,16 @@ impl<'a> Problem<'a> {
     }
 
     fn result(&self, solution: &DVector<f64>) -> Fit {
-        let (values, _) = self.unpack(solution);
+        let (mut values, _) = self.unpack(solution);
+        for i in &self.free {
+            // The solver stays strictly inside the range; at its end the end is meant.
+            let declaration = self.model.parameters[*i].declaration;
+            for end in [declaration.bounds().0, declaration.bounds().1] {
+                if (values[*i] - end).abs() < 1e-9 * declaration.scale {
+                    values[*i] = end;
+                }
+            }
+        }
         let (residual, jacobian) = self.linearise(solution);
         let gram = jacobian.tr_mul(&jacobian);
         let norms: Vec<f64> = (0..gram.ncols()).map(|i| gram[(i, i)].sqrt()).collect();
@@ -426,12 +441,15 @@ impl<'a> Problem<'a> {
             if let Some(k) = self.free.iter().position(|i| *i == index) {
                 let error = covariance[(k, k)].max(0.0).sqrt() * self.scales[k];
                 let known = error.is_finite() && !flatness.dead[k] && !flatness.flat[k];
+                let (low, high) = parameter.declaration.bounds();
                 if known {
                     estimate.std_error = Some(error);
-                    estimate.interval95 =
-                        Some([value - quantile * error, value + quantile * error]);
+                    // A value beyond the admissible range is not believed, however likely.
+                    estimate.interval95 = Some([
+                        (value - quantile * error).max(low),
+                        (value + quantile * error).min(high),
+                    ]);
                 }
-                let (low, high) = parameter.declaration.bounds();
                 let margin = 1e-4 * parameter.declaration.scale;
                 estimate.verdict = if flatness.dead[k] {
                     Verdict::Dead

@@ -19,17 +19,35 @@ impl From<RegressionError> for FitError {
 }
 
 /// Calls `each(row, time, φ, y)` for every regression that the samples of `runs` give.
+///
+/// Samples closer than `span` s to the last one used are passed over, with the mean of their
+/// inputs: a difference over a longer time stands out better from the noise.
 pub(crate) fn for_each_row(
     regression: &mut Regression,
     runs: &[Run],
+    span: f64,
     mut each: impl FnMut(usize, f64, &[f64], f64),
 ) {
     let mut offset = 0.0;
     for run in runs {
         regression.restart();
+        let mut input = vec![0.0; run.n_inputs];
+        let mut last = 0;
         for k in 0..run.len() {
-            let input = run.input(k.saturating_sub(1));
-            if regression.push(run.time[k], run.sample(k), input) {
+            if k > 0 && run.time[k] - run.time[last] < span {
+                continue;
+            }
+            // The mean of what was applied since the last sample used.
+            input.fill(0.0);
+            let elapsed = run.time[k] - run.time[last];
+            for i in last..k {
+                let share = (run.time[i + 1] - run.time[i]) / elapsed;
+                for (mean, value) in input.iter_mut().zip(run.input(i)) {
+                    *mean += share * value;
+                }
+            }
+            last = k;
+            if regression.push(run.time[k], run.sample(k), &input) {
                 for row in 0..regression.len() {
                     let (phi, y) = regression.row(row);
                     each(row, offset + run.time[k], phi, y);
@@ -43,8 +61,13 @@ pub(crate) fn for_each_row(
 /// Ordinary least squares over all samples: a starting point for a fit that needs one.
 ///
 /// Parameters that are free but enter non-linearly keep the model's value; values that the samples
-/// do not determine are those of least norm.
-pub(crate) fn batch(model: &Model, runs: &[Run], scheme: Scheme) -> Result<Vec<f64>, FitError> {
+/// do not determine are those of least norm. For `span` see [`for_each_row`].
+pub(crate) fn batch(
+    model: &Model,
+    runs: &[Run],
+    scheme: Scheme,
+    span: f64,
+) -> Result<Vec<f64>, FitError> {
     let mut linear = model.clone();
     for parameter in &mut linear.parameters {
         if !parameter.declaration.linear && parameter.value.is_some() {
@@ -58,7 +81,7 @@ pub(crate) fn batch(model: &Model, runs: &[Run], scheme: Scheme) -> Result<Vec<f
             (DMatrix::zeros(n, n), DVector::zeros(n))
         })
         .collect();
-    for_each_row(&mut regression, runs, |row, _, phi, y| {
+    for_each_row(&mut regression, runs, span, |row, _, phi, y| {
         let (gram, right) = &mut grams[row];
         for (i, a) in phi.iter().enumerate() {
             right[i] += a * y;

@@ -47,7 +47,7 @@ pub(crate) fn fit(
             Some(first)
         })
         .collect();
-    for_each_row(&mut regression, runs, |row, time, phi, y| {
+    for_each_row(&mut regression, runs, 0.0, |row, time, phi, y| {
         let innovation = estimators[row].update(phi, y);
         if !innovation.accepted {
             return;

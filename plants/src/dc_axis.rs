@@ -36,7 +36,8 @@ const LUMPED: [Parameter; 2] = [
         "K_A",
         "1/s",
         "damping: back-emf and viscous friction over inertia",
-    ),
+    )
+    .within(f64::NEG_INFINITY, 0.0),
     Parameter::new("K_C", "K_C", "rad/s^2/V", "acceleration per volt"),
 ];
 

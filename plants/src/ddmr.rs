@@ -110,6 +110,7 @@ const LUMPED: [Parameter; 8] = [
         "1/s",
         "forward damping: back-emf and viscous friction over mass",
     )
+    .within(f64::NEG_INFINITY, 0.0)
     .scaled(1.0),
     Parameter::new(
         "K_B",
@@ -131,6 +132,7 @@ const LUMPED: [Parameter; 8] = [
         "1/s",
         "yaw damping: back-emf and viscous friction over inertia",
     )
+    .within(f64::NEG_INFINITY, 0.0)
     .scaled(1.0),
     Parameter::new(
         "K_E",

@@ -34,7 +34,12 @@ impl SysIdLog {
     }
 
     fn drivetrain(&self, text: &mut String) {
-        text.push_str("[plant.ddmr]\n");
+        text.push_str(
+            "[plant.ddmr]\n\
+             # The linear model: runs straight ahead or on the spot never show v omega or omega^2.\n\
+             K_B = 0.0 # m/rad^2\n\
+             K_E = 0.0 # 1/m\n",
+        );
         let metres = self.metres_per_rotation();
         let radius = rounded(metres.map_or(GUESSED_WHEEL_RADIUS, |metres| metres / TAU));
         match metres {
@@ -71,6 +76,7 @@ impl SysIdLog {
                 line(text, &format!("half_track = {GUESSED_HALF_TRACK:?} # m"));
             }
         }
+        text.push_str("\n[fit]\nfixed = [\"K_B\", \"K_E\"]\n");
         text.push_str("\n# The inputs are the columns voltage_right_V and voltage_left_V.\n");
         text.push_str(
             "# Speeds come from the motor controller; many filter them and report them late:\n\

@@ -29,7 +29,11 @@ pub(crate) fn run(options: &CheckOptions) -> Result<(), Failure> {
 
 /// What the file is, when it is right.
 fn check(path: &Path) -> Result<String, Failure> {
-    if path.extension().is_some_and(|e| e == "toml") { toml(path) } else { log(path) }
+    if path.extension().is_some_and(|e| e == "toml") {
+        toml(path)
+    } else {
+        log(path)
+    }
 }
 
 fn toml(path: &Path) -> Result<String, Failure> {
@@ -49,7 +53,13 @@ fn toml(path: &Path) -> Result<String, Failure> {
                 .estimator
                 .as_ref()
                 .map_or_else(String::new, |e| format!(", estimator `{}`", e.meta().id)),
-            composed.1.controlled.iter().map(|s| s.id).collect::<Vec<_>>().join(", ")
+            composed
+                .1
+                .controlled
+                .iter()
+                .map(|s| s.id)
+                .collect::<Vec<_>>()
+                .join(", ")
         ));
     }
     if source.has("duration_s") || source.has("inputs") {
@@ -81,14 +91,20 @@ fn log(path: &Path) -> Result<String, Failure> {
     let log = loopsight_recordings::read(path).map_err(|e| failure::recording(path, &e))?;
     let table = log.table();
     let columns: Vec<&str> = table.columns.iter().map(|c| c.text.as_str()).collect();
-    let rows: usize = table.runs.iter().map(|r| r.rows.len() / columns.len().max(1)).sum();
-    let mut text =
-        format!("a log of {rows} rows in {} runs, columns {}", table.runs.len(), columns.join(", "));
+    let rows: usize = table
+        .runs
+        .iter()
+        .map(|r| r.rows.len() / columns.len().max(1))
+        .sum();
+    let mut text = format!(
+        "a log of {rows} rows in {} runs, columns {}",
+        table.runs.len(),
+        columns.join(", ")
+    );
     if let Some(toml) = log.model_toml() {
         let name = format!("model made from {}", path.display());
         let (model, _) = Model::from_toml(&name, &toml)?;
-        let recording =
-            crate::load::map(&model, &log).map_err(|e| failure::recording(path, &e))?;
+        let recording = crate::load::map(&model, &log).map_err(|e| failure::recording(path, &e))?;
         text.push_str(&format!("; describes itself as a `{}`", model.plant.id));
         let faults = output::faults(&recording.faults);
         if !faults.is_empty() {

@@ -43,7 +43,11 @@ pub(crate) fn run(options: &CompareOptions) -> Result<(), Failure> {
     }
     if let Some(path) = &options.html {
         let context = Context {
-            title: format!("{} held against {}", loaded.model.name, loaded.log_path.display()),
+            title: format!(
+                "{} held against {}",
+                loaded.model.name,
+                loaded.log_path.display()
+            ),
             model_name: loaded.model.name.clone(),
             model_file: loaded.model_path.as_ref().map(|p| p.display().to_string()),
             log_file: loaded.log_path.display().to_string(),

@@ -57,7 +57,10 @@ fn parameters(title: &str, list: &[Parameter]) -> String {
             ]
         })
         .collect();
-    format!("\n{title}\n{}\n", columns(&["name", "unit", "default", "in a fit", "what"], &rows))
+    format!(
+        "\n{title}\n{}\n",
+        columns(&["name", "unit", "default", "in a fit", "what"], &rows)
+    )
 }
 
 /// As [`output::table`], all columns to the left.
@@ -77,7 +80,10 @@ fn columns(head: &[&str], rows: &[Vec<String>]) -> String {
         format!("  {}", padded.join("  ").trim_end())
     };
     let mut lines = vec![line(head.to_vec())];
-    lines.extend(rows.iter().map(|r| line(r.iter().map(String::as_str).collect())));
+    lines.extend(
+        rows.iter()
+            .map(|r| line(r.iter().map(String::as_str).collect())),
+    );
     lines.join("\n")
 }
 
@@ -85,7 +91,11 @@ fn signals(title: &str, list: &[Signal]) -> String {
     let rows: Vec<Vec<String>> = list
         .iter()
         .map(|s| {
-            vec![format!("{} ({})", s.id, s.symbol), s.unit.to_owned(), s.doc.to_owned()]
+            vec![
+                format!("{} ({})", s.id, s.symbol),
+                s.unit.to_owned(),
+                s.doc.to_owned(),
+            ]
         })
         .collect();
     format!("\n{title}\n{}\n", columns(&["name", "unit", "what"], &rows))
@@ -99,7 +109,10 @@ fn plant(meta: &PlantMeta) -> String {
     text.push_str(&signals("Further signals", meta.outputs));
     text.push_str(&parameters("Parameters", meta.parameters));
     for set in meta.parameterizations {
-        let title = format!("Parameters in [plant.{}.{}]: {}", meta.id, set.id, set.summary);
+        let title = format!(
+            "Parameters in [plant.{}.{}]: {}",
+            meta.id, set.id, set.summary
+        );
         text.push_str(&parameters(&title, set.parameters));
     }
     let effects = registry::effects();
@@ -107,8 +120,11 @@ fn plant(meta: &PlantMeta) -> String {
         .channels
         .iter()
         .map(|c| {
-            let fitting: Vec<&str> =
-                effects.iter().filter(|e| misfit(c, e).is_none()).map(|e| e.id).collect();
+            let fitting: Vec<&str> = effects
+                .iter()
+                .filter(|e| misfit(c, e).is_none())
+                .map(|e| e.id)
+                .collect();
             vec![
                 c.id.to_owned(),
                 c.place.kind().name().to_owned(),
@@ -120,7 +136,10 @@ fn plant(meta: &PlantMeta) -> String {
         .collect();
     text.push_str(&format!(
         "\nChannels, where effects attach\n{}\n",
-        columns(&["name", "place", "unit", "equation", "effects that fit"], &rows)
+        columns(
+            &["name", "place", "unit", "equation", "effects that fit"],
+            &rows
+        )
     ));
     text.push_str(&tail(meta.reference, meta.example));
     text
@@ -128,18 +147,28 @@ fn plant(meta: &PlantMeta) -> String {
 
 fn effect(meta: &EffectMeta) -> String {
     let mut text = head("effect", meta.id, meta.summary, meta.equation);
-    text.push_str(&format!("\nSymptom: {}\nRemedy: {}\n", meta.symptom, meta.remedy));
+    text.push_str(&format!(
+        "\nSymptom: {}\nRemedy: {}\n",
+        meta.symptom, meta.remedy
+    ));
     text.push_str(&parameters("Parameters", meta.parameters));
     let rows: Vec<Vec<String>> = registry::plants()
         .iter()
         .map(|p| {
-            let channels: Vec<&str> =
-                p.channels.iter().filter(|c| misfit(c, meta).is_none()).map(|c| c.id).collect();
+            let channels: Vec<&str> = p
+                .channels
+                .iter()
+                .filter(|c| misfit(c, meta).is_none())
+                .map(|c| c.id)
+                .collect();
             vec![p.id.to_owned(), channels.join(", ")]
         })
         .filter(|r| !r[1].is_empty())
         .collect();
-    text.push_str(&format!("\nWhere it attaches\n{}\n", columns(&["plant", "channels"], &rows)));
+    text.push_str(&format!(
+        "\nWhere it attaches\n{}\n",
+        columns(&["plant", "channels"], &rows)
+    ));
     text.push_str(&tail(meta.reference, meta.example));
     text
 }
@@ -151,7 +180,10 @@ fn part(meta: &PartMeta) -> String {
         .iter()
         .map(|s| vec![s.id.to_owned(), s.unit.to_owned(), s.doc.to_owned()])
         .collect();
-    text.push_str(&format!("\nSettings\n{}\n", columns(&["name", "unit", "what"], &rows)));
+    text.push_str(&format!(
+        "\nSettings\n{}\n",
+        columns(&["name", "unit", "what"], &rows)
+    ));
     text.push_str(&tail(meta.reference, meta.example));
     text
 }

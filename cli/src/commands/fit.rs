@@ -42,12 +42,19 @@ pub(crate) fn run(options: &FitOptions) -> Result<(), Failure> {
         ..FitSettings::default()
     };
     let bar = watch("fitting");
-    let result = fit::fit(&loaded.model, &loaded.runs, test.as_deref(), &faults, &settings, &|i, e| {
-        bar.set_message(match settings.method {
-            Method::OutputError => format!("iteration {i}, error {}", output::percent(e)),
-            Method::Rls => format!("{} of the samples", output::percent(e)),
-        });
-    });
+    let result = fit::fit(
+        &loaded.model,
+        &loaded.runs,
+        test.as_deref(),
+        &faults,
+        &settings,
+        &|i, e| {
+            bar.set_message(match settings.method {
+                Method::OutputError => format!("iteration {i}, error {}", output::percent(e)),
+                Method::Rls => format!("{} of the samples", output::percent(e)),
+            });
+        },
+    );
     bar.finish_and_clear();
     let result = result?;
 
@@ -75,7 +82,11 @@ fn text(options: &FitOptions, fit: &Fit) -> String {
         Some(path) => format!("\non {}, which it was not fitted to:\n", path.display()),
         None => "\n".to_owned(),
     };
-    format!("{}\n{judged}{}", output::fit(fit), output::comparison(&fit.comparison))
+    format!(
+        "{}\n{judged}{}",
+        output::fit(fit),
+        output::comparison(&fit.comparison)
+    )
 }
 
 /// The model file with the values of the fit in it.
@@ -101,7 +112,11 @@ fn context(options: &FitOptions, loaded: &Loaded) -> Context {
     }
     let shown = options.test.as_ref().unwrap_or(&loaded.log_path);
     Context {
-        title: format!("{} fitted to {}", loaded.model.name, loaded.log_path.display()),
+        title: format!(
+            "{} fitted to {}",
+            loaded.model.name,
+            loaded.log_path.display()
+        ),
         model_name: loaded.model.name.clone(),
         model_file: loaded.model_path.as_ref().map(|p| p.display().to_string()),
         log_file: shown.display().to_string(),

@@ -15,7 +15,10 @@ struct Entry {
 }
 
 pub(crate) fn run(options: &ListOptions) -> Result<(), Failure> {
-    let entries: Vec<Entry> = all().into_iter().filter(|e| wanted(options.role, e.role)).collect();
+    let entries: Vec<Entry> = all()
+        .into_iter()
+        .filter(|e| wanted(options.role, e.role))
+        .collect();
     if options.json {
         return output::json(&entries);
     }
@@ -40,7 +43,11 @@ pub(crate) fn run(options: &ListOptions) -> Result<(), Failure> {
 fn all() -> Vec<Entry> {
     let mut entries: Vec<Entry> = registry::plants()
         .iter()
-        .map(|m| Entry { role: "plant", id: m.id, summary: m.summary })
+        .map(|m| Entry {
+            role: "plant",
+            id: m.id,
+            summary: m.summary,
+        })
         .collect();
     entries.extend(registry::effects().iter().map(|m| Entry {
         role: "effect",

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use loopsight_core::TickError;
 use loopsight_core::config::{Source, read_text};
 use loopsight_core::loop_file::{Composed, LoopFile};
 use loopsight_core::model::Model;
 use loopsight_core::registry::{BuildError, DriverContext};
-use loopsight_core::{Estimator as _, TickError};
 use loopsight_diagnosis::tracking::{StepResponse, step_responses};
 use loopsight_recordings::{LogWriter, header};
 use loopsight_report::{
@@ -95,19 +95,27 @@ pub(crate) fn run(options: &RunOptions) -> Result<(), Failure> {
             title,
             model_name: model.name.clone(),
             model_file: Some(beside(&options.file, &file.model).display().to_string()),
-            log_file: summary.log.as_ref().map_or_else(String::new, |l| l.display().to_string()),
+            log_file: summary
+                .log
+                .as_ref()
+                .map_or_else(String::new, |l| l.display().to_string()),
             notes: Vec::new(),
             command: output::command_line(),
         };
         save(path, &run_page(&context, &record))?;
         output::note(&format!("wrote {}", path.display()));
     }
-    if end.failed { Err(Failure::work(end.text)) } else { Ok(()) }
+    if end.failed {
+        Err(Failure::work(end.text))
+    } else {
+        Ok(())
+    }
 }
 
 /// A path in a loop file is relative to that file.
 fn beside(file: &Path, path: &str) -> PathBuf {
-    file.parent().map_or_else(|| PathBuf::from(path), |folder| folder.join(path))
+    file.parent()
+        .map_or_else(|| PathBuf::from(path), |folder| folder.join(path))
 }
 
 /// Composes the loop of a loop file.
@@ -129,9 +137,8 @@ pub(crate) fn compose(
     };
     let load_runs = |name: &str, model: &Model| {
         let path = beside(path, name);
-        let wrong = |e: &loopsight_recordings::RecordingError| {
-            BuildError::at("recording", e.to_string())
-        };
+        let wrong =
+            |e: &loopsight_recordings::RecordingError| BuildError::at("recording", e.to_string());
         let log = loopsight_recordings::read(&path).map_err(|e| wrong(&e))?;
         Ok(load::map(model, &log).map_err(|e| wrong(&e))?.runs)
     };
@@ -161,13 +168,18 @@ fn drive(
     let seen = Arc::clone(&stop);
     // A second handler (another run in the same process) is refused: the first one still stops us.
     let _ = ctrlc::set_handler(move || seen.store(true, Ordering::SeqCst));
-    let ticks = file
-        .duration_s
-        .map_or(u64::MAX, |d| (d / file.period_s + 1e-9).floor().min(1e15) as u64);
+    let ticks = file.duration_s.map_or(u64::MAX, |d| {
+        (d / file.period_s + 1e-9).floor().min(1e15) as u64
+    });
     let bar = progress::bar("running", if ticks == u64::MAX { 0 } else { ticks });
     let mut reference = vec![0.0; composed.references.len()];
-    let mut end =
-        End { text: format!("the run lasted the {} s asked for", output::number(ticks as f64 * file.period_s)), failed: false };
+    let mut end = End {
+        text: format!(
+            "the run lasted the {} s asked for",
+            output::number(ticks as f64 * file.period_s)
+        ),
+        failed: false,
+    };
     for index in 0..ticks {
         if stop.load(Ordering::SeqCst) {
             end.text = format!("stopped by Ctrl-C at {:.2} s", index as f64 * file.period_s);
@@ -181,7 +193,8 @@ fn drive(
             Ok(step) => {
                 recorder.push(time, &reference, &step);
                 if let Some(log) = log.as_mut() {
-                    log.write(recorder.row()).map_err(|e| Failure::work(e.to_string()))?;
+                    log.write(recorder.row())
+                        .map_err(|e| Failure::work(e.to_string()))?;
                 }
             }
             Err(error) => {
@@ -202,7 +215,10 @@ fn drive(
     }
     bar.finish_and_clear();
     if let Err(error) = composed.host.stop() {
-        end = End { text: format!("the robot could not be stopped safely: {error}"), failed: true };
+        end = End {
+            text: format!("the robot could not be stopped safely: {error}"),
+            failed: true,
+        };
     }
     Ok(end)
 }
@@ -211,7 +227,12 @@ fn log_headers(model: &Model, composed: &Composed) -> Vec<String> {
     let mut headers = vec!["time_s".to_owned()];
     headers.extend(model.plant.inputs.iter().map(header));
     headers.extend(model.measured.iter().map(|m| header(m.signal)));
-    headers.extend(composed.controlled.iter().map(|s| format!("reference_{}", header(s))));
+    headers.extend(
+        composed
+            .controlled
+            .iter()
+            .map(|s| format!("reference_{}", header(s))),
+    );
     headers.push("saturated_1".to_owned());
     headers
 }
@@ -300,10 +321,14 @@ impl Recorder {
         let was = record.saturated.last().copied().unwrap_or(false);
         record.saturated.push(step.outcome.saturated);
         if step.outcome.saturated && !was && record.events.len() < 1000 {
-            record.events.push((time, "an actuator saturates".to_owned()));
+            record
+                .events
+                .push((time, "an actuator saturates".to_owned()));
         }
         if step.outcome.held && record.events.len() < 1000 {
-            record.events.push((time, "the last safe command is held".to_owned()));
+            record
+                .events
+                .push((time, "the last safe command is held".to_owned()));
         }
         self.row.clear();
         self.row.push((time * 1e9).round() / 1e9);
@@ -319,7 +344,9 @@ impl Recorder {
     }
 
     fn learn(&mut self, composed: &Composed) {
-        let Some(identification) = &composed.host.observer else { return };
+        let Some(identification) = &composed.host.observer else {
+            return;
+        };
         let mut next = 0;
         for row in 0..self.names.len() {
             let estimator = identification.estimator(row);
@@ -327,7 +354,9 @@ impl Recorder {
                 self.record.parameters[next].values.push(*theta);
                 next += 1;
             }
-            let innovation = identification.innovation(row).map_or(f64::NAN, |i| i.innovation);
+            let innovation = identification
+                .innovation(row)
+                .map_or(f64::NAN, |i| i.innovation);
             self.record.innovations[row].values.push(innovation);
         }
     }
@@ -342,7 +371,13 @@ fn tracking(record: &LoopRecord) -> Vec<Tracking> {
         .controlled
         .iter()
         .map(|trace| {
-            let errors = || trace.reference.iter().zip(&trace.measured).map(|(r, m)| r - m);
+            let errors = || {
+                trace
+                    .reference
+                    .iter()
+                    .zip(&trace.measured)
+                    .map(|(r, m)| r - m)
+            };
             Tracking {
                 id: trace.id.clone(),
                 unit: trace.unit.clone(),
@@ -371,8 +406,7 @@ fn reached(tracking: &[Tracking]) -> Vec<String> {
                 t.id,
                 settled.len(),
                 t.steps.len(),
-                median(settled)
-                    .map_or_else(String::new, |m| format!(", after {m:.3} s (median)")),
+                median(settled).map_or_else(String::new, |m| format!(", after {m:.3} s (median)")),
                 median(overshoot).unwrap_or(f64::NAN)
             ))
         })
@@ -411,12 +445,17 @@ fn summary_text(summary: &Summary, record: &LoopRecord) -> String {
             .map(|p| {
                 vec![
                     p.name.clone(),
-                    p.values.last().map_or_else(|| "-".to_owned(), |v| output::number(*v)),
+                    p.values
+                        .last()
+                        .map_or_else(|| "-".to_owned(), |v| output::number(*v)),
                     p.unit.clone(),
                 ]
             })
             .collect();
-        text.push_str(&format!("\n\n{}", output::table(&["identified", "value", "unit"], &rows)));
+        text.push_str(&format!(
+            "\n\n{}",
+            output::table(&["identified", "value", "unit"], &rows)
+        ));
     }
     for note in &summary.notes {
         text.push_str(&format!("\n{note}"));

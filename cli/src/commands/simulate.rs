@@ -38,9 +38,10 @@ const MOST_SAMPLES: f64 = 1e7;
 impl Experiment {
     pub(crate) fn parse(source: &Source) -> Result<Self, Box<ConfigError>> {
         let experiment: Self = source.read()?;
-        for (key, value) in
-            [("duration_s", experiment.duration_s), ("period_s", experiment.period_s)]
-        {
+        for (key, value) in [
+            ("duration_s", experiment.duration_s),
+            ("period_s", experiment.period_s),
+        ] {
             if !(value > 0.0 && value.is_finite()) {
                 let message = format!("`{key}` is {value} s, expected a number above 0 s");
                 return Err(source.error(&[key.into()], &message, None));
@@ -48,22 +49,20 @@ impl Experiment {
         }
         let samples = experiment.duration_s / experiment.period_s;
         if samples > MOST_SAMPLES {
-            let message = format!("that is {samples:.1e} samples, expected at most {MOST_SAMPLES:e}");
+            let message =
+                format!("that is {samples:.1e} samples, expected at most {MOST_SAMPLES:e}");
             return Err(source.error(&["period_s".into()], &message, None));
         }
         if experiment.robot.model.is_some() {
-            let message = "the robot's model is the MODEL of the command, so none can be named here";
+            let message =
+                "the robot's model is the MODEL of the command, so none can be named here";
             return Err(source.error(&["robot".into(), "model".into()], message, None));
         }
         Ok(experiment)
     }
 
     /// Runs the experiment on the robot `model`.
-    pub(crate) fn simulate(
-        &self,
-        source: &Source,
-        model: &Model,
-    ) -> Result<Run, Box<ConfigError>> {
+    pub(crate) fn simulate(&self, source: &Source, model: &Model) -> Result<Run, Box<ConfigError>> {
         let steps = (self.duration_s / self.period_s + 1e-9).floor() as usize;
         let time: Vec<f64> = (0..=steps).map(|k| k as f64 * self.period_s).collect();
         let inputs = excitation::build(&self.inputs, model.plant.inputs)
@@ -113,13 +112,17 @@ fn write(path: &Path, model: &Model, run: &Run) -> Result<(), Failure> {
     for k in 0..run.len() {
         // Nine digits are far below any sensor's noise and keep logs small.
         rows.push(rounded(run.time[k]));
-        rows.extend(run.input(k).iter().map(|v| rounded(*v)));
-        rows.extend_from_slice(run.sample(k));
+        rows.extend(
+            run.input(k)
+                .iter()
+                .chain(run.sample(k))
+                .map(|v| rounded(*v)),
+        );
     }
     write_csv(path, &headers, &rows).map_err(|e| failure::recording(path, &e))
 }
 
-/// Without the rounding errors of `k * period`.
+/// Without the digits that are rounding errors of the simulation.
 fn rounded(value: f64) -> f64 {
-    (value * 1e9).round() / 1e9
+    (value * 1e12).round() / 1e12
 }

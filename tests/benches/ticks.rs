@@ -1,0 +1,434 @@
+//! What generality costs: one estimator update and one integration step of a composed plant,
+//! beside the same arithmetic written by hand.
+//!
+//! `cargo bench -p loopsight-tests` prints the ratios, measured in turns within one run so that a
+//! slow moment of the machine hits both sides alike, and then criterion's own figures.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use criterion::Criterion;
+use loopsight_core::model::Model;
+use loopsight_core::simulate::Simulator;
+use loopsight_core::{Estimator, Real};
+use loopsight_estimators::{Rls, RlsSettings};
+use loopsight_plants as _;
+use nalgebra::{DVector, SVector};
+
+const PAPER: &str = "[plant.ddmr]
+K_A = -15.146
+K_B = 0.005
+K_C = 0.136
+K_D = -9.573
+K_E = -3.945
+K_F = 0.656
+half_track = 0.131
+wheel_radius = 0.05
+";
+
+const FORGETTING: f64 = 0.99;
+const LIMIT: f64 = 1e6;
+
+/// The update of `Rls` by hand, for three parameters: the same factored covariance, checks, bound
+/// and symmetric result, on plain arrays.
+struct ByHand {
+    theta: [f64; 3],
+    p: [[f64; 3]; 3],
+    u: [[f64; 3]; 3],
+    d: [f64; 3],
+    cap: f64,
+    enlargement: f64,
+}
+
+impl ByHand {
+    fn new() -> Self {
+        let slack = 36.0 * f64::EPSILON / 2.0;
+        Self {
+            theta: [0.0; 3],
+            p: [[0.0; 3]; 3],
+            u: [[0.0; 3]; 3],
+            d: [LIMIT / (1.0 + 2.0 * slack); 3],
+            cap: LIMIT / (1.0 + 2.0 * slack),
+            enlargement: 1.0 + slack,
+        }
+    }
+
+    fn absorb(&mut self, f: &[f64; 3], v: &[f64; 3], noise: f64, growth: f64) {
+        let mut b = [0.0; 3];
+        let mut alpha = noise;
+        let mut inverse = 1.0 / alpha;
+        for j in 0..3 {
+            let p = f[j] * inverse;
+            let before = alpha;
+            alpha += v[j] * f[j];
+            inverse = 1.0 / alpha;
+            self.d[j] = (self.d[j] * (before * inverse) * growth).max(1e-30);
+            for i in 0..j {
+                let old = self.u[i][j];
+                self.u[i][j] = old - b[i] * p;
+                b[i] += old * v[j];
+            }
+            b[j] = v[j];
+        }
+    }
+
+    fn update(&mut self, phi: &[f64; 3], y: f64) -> (f64, f64, bool) {
+        let (mut f, mut v) = ([0.0; 3], [0.0; 3]);
+        let (mut spread, mut innovation) = (0.0, y);
+        for j in 0..3 {
+            f[j] = phi[j];
+            for i in 0..j {
+                f[j] += self.u[i][j] * phi[i];
+            }
+            v[j] = self.d[j] * f[j];
+            spread += v[j] * f[j];
+            innovation -= phi[j] * self.theta[j];
+        }
+        if !(innovation.is_finite() && spread.is_finite()) {
+            return (f64::NAN, f64::NAN, false);
+        }
+        let step = innovation / (FORGETTING + spread);
+        let mut theta = [0.0; 3];
+        for i in 0..3 {
+            let mut gain = v[i];
+            for j in i + 1..3 {
+                gain += self.u[i][j] * v[j];
+            }
+            theta[i] = self.theta[i] + gain * step;
+        }
+        if theta.iter().any(|t| !t.is_finite()) {
+            return (f64::NAN, f64::NAN, false);
+        }
+        self.theta = theta;
+        self.absorb(&f, &v, FORGETTING, 1.0 / FORGETTING);
+        for i in 0..3 {
+            let mut variance = self.d[i];
+            for k in i + 1..3 {
+                variance += self.u[i][k] * self.u[i][k] * self.d[k];
+            }
+            if variance > self.cap {
+                let (mut f, mut v) = ([0.0; 3], [0.0; 3]);
+                f[i] = 1.0;
+                v[i] = self.d[i];
+                for j in i + 1..3 {
+                    f[j] = self.u[i][j];
+                    v[j] = self.d[j] * f[j];
+                }
+                self.absorb(&f, &v, self.cap * (variance / (variance - self.cap)), 1.0);
+            }
+        }
+        for j in 0..3 {
+            for i in 0..=j {
+                let mut sum = if i == j {
+                    self.d[j]
+                } else {
+                    self.u[i][j] * self.d[j]
+                };
+                for k in j + 1..3 {
+                    sum += self.u[i][k] * self.d[k] * self.u[j][k];
+                }
+                self.p[i][j] = sum;
+                self.p[j][i] = sum;
+            }
+            self.p[j][j] *= self.enlargement;
+        }
+        (innovation, 1.0 + spread, true)
+    }
+}
+
+/// (44)-(47) as they stand, one triangle mirrored: faster, and indefinite sooner or later.
+struct Textbook {
+    theta: [f64; 3],
+    p: [[f64; 3]; 3],
+}
+
+impl Textbook {
+    fn update(&mut self, phi: &[f64; 3], y: f64) -> (f64, f64, bool) {
+        let (mut g, mut spread, mut innovation) = ([0.0; 3], 0.0, y);
+        for i in 0..3 {
+            for j in 0..3 {
+                g[i] += self.p[i][j] * phi[j];
+            }
+            spread += g[i] * phi[i];
+            innovation -= phi[i] * self.theta[i];
+        }
+        if !(innovation.is_finite() && spread.is_finite()) {
+            return (f64::NAN, f64::NAN, false);
+        }
+        let inverse = 1.0 / (FORGETTING + spread);
+        for i in 0..3 {
+            self.theta[i] += g[i] * inverse * innovation;
+            for j in i..3 {
+                let value = (self.p[i][j] - g[i] * inverse * g[j]) * (1.0 / FORGETTING);
+                self.p[i][j] = value;
+                self.p[j][i] = value;
+            }
+        }
+        (innovation, 1.0 + spread, true)
+    }
+}
+
+/// Regressors of the robot under a pseudo-random binary excitation.
+fn samples() -> Vec<([f64; 3], f64)> {
+    let (mut u, mut volts, mut state) = ([0.0f64; 2], [9.0, -9.0], 7u64);
+    (0..1024)
+        .map(|k| {
+            if k % 50 == 0 {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                volts = [33, 34].map(|bit| if state >> bit & 1 == 0 { 9.0 } else { -9.0 });
+            }
+            let phi = [u[0], u[1] * u[1], volts[0] + volts[1]];
+            let y = -15.146 * phi[0] + 0.005 * phi[1] + 0.136 * phi[2];
+            u[0] += 0.01 * y;
+            u[1] += 0.01 * (-9.573 * u[1] - 3.945 * u[0] * u[1] + 0.656 * (volts[0] - volts[1]));
+            (phi, y)
+        })
+        .collect()
+}
+
+fn settings() -> RlsSettings {
+    RlsSettings {
+        forgetting: FORGETTING,
+        initial_covariance: LIMIT,
+        covariance_limit: None,
+    }
+}
+
+/// The robot's six equations, by hand.
+#[derive(Clone, Copy)]
+struct Robot {
+    k: [f64; 6],
+}
+
+impl Robot {
+    #[inline]
+    fn rate(
+        &self,
+        x: &[f64; 6],
+        volts: &[f64; 2],
+        sin_cos: impl Fn(f64) -> (f64, f64),
+    ) -> [f64; 6] {
+        let [v, omega, heading, ..] = *x;
+        let (sin, cos) = sin_cos(heading);
+        [
+            self.k[0] * v + self.k[1] * omega * omega + self.k[2] * (volts[0] + volts[1]),
+            self.k[3] * omega + self.k[4] * v * omega + self.k[5] * (volts[0] - volts[1]),
+            omega,
+            v,
+            v * cos,
+            v * sin,
+        ]
+    }
+
+    /// One step of the classical Runge-Kutta method.
+    #[inline]
+    fn step(
+        &self,
+        x: &mut [f64; 6],
+        h: f64,
+        volts: &[f64; 2],
+        sin_cos: impl Fn(f64) -> (f64, f64) + Copy,
+    ) {
+        let along = |x: &[f64; 6], k: &[f64; 6], h: f64| -> [f64; 6] {
+            std::array::from_fn(|i| x[i] + h * k[i])
+        };
+        let k1 = self.rate(x, volts, sin_cos);
+        let k2 = self.rate(&along(x, &k1, 0.5 * h), volts, sin_cos);
+        let k3 = self.rate(&along(x, &k2, 0.5 * h), volts, sin_cos);
+        let k4 = self.rate(&along(x, &k3, h), volts, sin_cos);
+        for i in 0..6 {
+            x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
+        }
+    }
+}
+
+/// The functions the composed model uses, which give the same digits on every machine.
+fn portable(angle: f64) -> (f64, f64) {
+    (Real::sin(angle), Real::cos(angle))
+}
+
+/// Nanoseconds per call of each of `sides`, in turns; medians of many rounds, and the median over
+/// the rounds of the ratio of each to the last.
+fn in_turns(calls: usize, sides: &mut [(&str, &mut dyn FnMut(usize))]) {
+    const ROUNDS: usize = 301;
+    let mut times = vec![vec![0.0; ROUNDS]; sides.len()];
+    for round in 0..ROUNDS {
+        for (side, (_, run)) in sides.iter_mut().enumerate() {
+            let start = Instant::now();
+            run(calls);
+            times[side][round] = start.elapsed().as_secs_f64() * 1e9 / calls as f64;
+        }
+    }
+    let median = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    let last = times[sides.len() - 1].clone();
+    for ((name, _), time) in sides.iter().zip(&times) {
+        let ratio = median(time.iter().zip(&last).map(|(a, b)| a / b).collect());
+        println!(
+            "  {name:<46} {:>8.2} ns  ratio {ratio:.2}",
+            median(time.clone())
+        );
+    }
+}
+
+fn estimator(criterion: &mut Criterion, ratios: bool) {
+    let samples = samples();
+    let mut fixed = Rls::new(SVector::<f64, 3>::zeros(), &settings()).expect("settings are right");
+    let mut dynamic = Rls::new(DVector::<f64>::zeros(3), &settings()).expect("settings are right");
+    let mut boxed: Box<dyn Estimator<f64>> = Box::new(fixed.clone());
+    let mut by_hand = ByHand::new();
+    let mut textbook = Textbook {
+        theta: [0.0; 3],
+        p: [[LIMIT, 0.0, 0.0], [0.0, LIMIT, 0.0], [0.0, 0.0, LIMIT]],
+    };
+    // The same arithmetic: the same digits.
+    for (phi, y) in &samples {
+        fixed.update(phi, *y);
+        by_hand.update(phi, *y);
+    }
+    assert_eq!(fixed.theta(), by_hand.theta);
+    assert_eq!(fixed.covariance(), by_hand.p.as_flattened());
+
+    if ratios {
+        println!("one RLS update, three parameters (ratio to the last line)");
+        in_turns(
+            20_480,
+            &mut [
+                ("textbook P - K φᵀP, by hand", &mut |calls| {
+                    for (phi, y) in samples.iter().cycle().take(calls) {
+                        black_box(textbook.update(black_box(phi), black_box(*y)));
+                    }
+                }),
+                ("Rls<f64, Dyn>", &mut |calls| {
+                    for (phi, y) in samples.iter().cycle().take(calls) {
+                        black_box(dynamic.update(black_box(phi), black_box(*y)));
+                    }
+                }),
+                ("Box<dyn Estimator>", &mut |calls| {
+                    for (phi, y) in samples.iter().cycle().take(calls) {
+                        black_box(boxed.update(black_box(phi), black_box(*y)));
+                    }
+                }),
+                ("Rls<f64, Const<3>>  (target: 1.3)", &mut |calls| {
+                    for (phi, y) in samples.iter().cycle().take(calls) {
+                        black_box(fixed.update(black_box(phi), black_box(*y)));
+                    }
+                }),
+                (
+                    "the same by hand on [f64; 3], [[f64; 3]; 3]",
+                    &mut |calls| {
+                        for (phi, y) in samples.iter().cycle().take(calls) {
+                            black_box(by_hand.update(black_box(phi), black_box(*y)));
+                        }
+                    },
+                ),
+            ],
+        );
+    }
+    let mut group = criterion.benchmark_group("rls_update");
+    // One after another: the same sample for ever would leave two directions without excitation.
+    let mut next = samples.iter().cycle();
+    group.bench_function("generic", |b| {
+        b.iter(|| {
+            if let Some((phi, y)) = next.next() {
+                black_box(fixed.update(black_box(phi), black_box(*y)));
+            }
+        });
+    });
+    group.bench_function("by_hand", |b| {
+        b.iter(|| {
+            if let Some((phi, y)) = next.next() {
+                black_box(by_hand.update(black_box(phi), black_box(*y)));
+            }
+        });
+    });
+    group.finish();
+}
+
+/// Steps of 2.5 ms in an interval of 10 ms, as a loop at 100 Hz has them.
+const STEPS: usize = 4;
+
+fn plant(criterion: &mut Criterion, ratios: bool) {
+    let (model, _) = Model::from_toml("model.toml", PAPER).expect("the model is right");
+    let mut simulator = Simulator::<f64>::new(&model, &model.values());
+    let robot = black_box(Robot {
+        k: [-15.146, 0.005, 0.136, -9.573, -3.945, 0.656],
+    });
+    let volts = |k: usize| {
+        if k / 50 % 2 == 0 {
+            [9.0, -5.0]
+        } else {
+            [-9.0, 5.0]
+        }
+    };
+    let composed = |simulator: &mut Simulator<'_, f64>, calls: usize| {
+        simulator.reset(&[0.0; 6], &[0.0; 2]);
+        for k in 0..calls / STEPS {
+            simulator.advance(black_box((k + 1) as f64 * 0.01), black_box(&volts(k)));
+        }
+        black_box(simulator.state());
+    };
+    let by_hand = |calls: usize, sin_cos: fn(f64) -> (f64, f64)| -> [f64; 6] {
+        let mut x = [0.0; 6];
+        for k in 0..calls / STEPS {
+            let volts = black_box(volts(k));
+            for _ in 0..STEPS {
+                robot.step(&mut x, black_box(0.0025), &volts, sin_cos);
+            }
+        }
+        black_box(x)
+    };
+    // The same equations: the same robot.
+    composed(&mut simulator, 1024);
+    for (a, b) in simulator.state().iter().zip(by_hand(1024, portable)) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+    if ratios {
+        println!("one RK4 step of the robot, six states (ratio to the last line)");
+        in_turns(
+            4_096,
+            &mut [
+                ("by hand, with the platform's sin and cos", &mut |calls| {
+                    by_hand(calls, f64::sin_cos);
+                }),
+                ("composed from TOML  (target: 1.5)", &mut |calls| {
+                    composed(&mut simulator, calls);
+                }),
+                ("by hand", &mut |calls| {
+                    by_hand(calls, portable);
+                }),
+            ],
+        );
+    }
+    let mut group = criterion.benchmark_group("rk4_step_x4");
+    let mut time = 0.0;
+    simulator.reset(&[0.1, 0.5, 0.3, 0.0, 0.0, 0.0], &[0.0; 2]);
+    group.bench_function("composed", |b| {
+        b.iter(|| {
+            time += 0.01;
+            simulator.advance(black_box(time), black_box(&[3.0, 4.0]));
+        });
+    });
+    let mut x = [0.1, 0.5, 0.3, 0.0, 0.0, 0.0];
+    group.bench_function("by_hand", |b| {
+        b.iter(|| {
+            for _ in 0..STEPS {
+                robot.step(&mut x, black_box(0.0025), black_box(&[3.0, 4.0]), portable);
+            }
+        });
+    });
+    group.finish();
+}
+
+fn main() {
+    // `cargo test --benches` only wants to know that it runs.
+    let ratios = std::env::args().any(|a| a == "--bench");
+    let mut criterion = Criterion::default().configure_from_args();
+    estimator(&mut criterion, ratios);
+    plant(&mut criterion, ratios);
+    criterion.final_summary();
+}
