@@ -4,6 +4,15 @@
 //! `cargo bench -p loopsight-tests` prints the ratios, measured in turns within one run so that a
 //! slow moment of the machine hits both sides alike, and then criterion's own figures.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "matrix arithmetic reads best with its indices"
+)]
+#![allow(
+    clippy::expect_used,
+    reason = "what is built here is right, and a panic is how this program fails"
+)]
+
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -359,7 +368,7 @@ fn plant(criterion: &mut Criterion, ratios: bool) {
         k: [-15.146, 0.005, 0.136, -9.573, -3.945, 0.656],
     });
     let volts = |k: usize| {
-        if k / 50 % 2 == 0 {
+        if (k / 50).is_multiple_of(2) {
             [9.0, -5.0]
         } else {
             [-9.0, 5.0]

@@ -1,5 +1,10 @@
 //! The composed loop against the closed form it was designed for.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "what is built here is right, and a panic is how this program fails"
+)]
+
 use loopsight_controllers::{PiResponse, settling_time};
 use loopsight_core::config::Source;
 use loopsight_core::model::{Affine, Model};
@@ -97,8 +102,8 @@ impl Driver<f64> for Robot {
     }
 
     fn write(&mut self, command: &[f64], applied: &mut [f64]) -> Result<(), DriverFault> {
-        for i in 0..2 {
-            self.volts[i] = command[i].clamp(-self.limit, self.limit);
+        for (volts, asked) in self.volts.iter_mut().zip(command) {
+            *volts = asked.clamp(-self.limit, self.limit);
         }
         applied.copy_from_slice(&self.volts);
         Ok(())

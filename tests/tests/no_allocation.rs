@@ -1,5 +1,10 @@
 //! Nothing in a running loop allocates.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "what is built here is right, and a panic is how this program fails"
+)]
+
 use allocation_counter::measure;
 use loopsight_controllers::FeedbackLinearizingPiSettings;
 use loopsight_core::model::Model;

@@ -1,6 +1,15 @@
 //! Laws of recursive least squares: what must hold for any plant, any excitation and any number
 //! of updates.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "matrix arithmetic reads best with its indices"
+)]
+#![allow(
+    clippy::unwrap_used,
+    reason = "what is built here is right, and a panic is how this program fails"
+)]
+
 use loopsight_core::config::Source;
 use loopsight_core::registry::{ControllerPart, EstimatorPart};
 use loopsight_core::{Estimator, Real};
