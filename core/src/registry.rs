@@ -177,6 +177,13 @@ pub trait ControllerPart: Debug + Send + Sync {
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
+    /// What the design promises: the controlled signals from rest, sampled with `period` (s), for
+    /// `references` (one list of samples per controlled signal), without limits or disturbances.
+    /// `None` where the design promises nothing of that kind.
+    fn ideal(&self, references: &[Vec<f64>], period: f64) -> Option<Vec<Vec<f64>>> {
+        let _ = (references, period);
+        None
+    }
 }
 
 /// The error of a driver chosen at run time.

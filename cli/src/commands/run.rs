@@ -68,6 +68,7 @@ pub(crate) fn run(options: &RunOptions) -> Result<(), Failure> {
     }
     let mut record = recorder.record;
     record.end = end.text.clone();
+    promise(&file, &mut record);
     let tracking = tracking(&record);
     record.notes.extend(composed.notes.iter().cloned());
     record.notes.extend(reached(&tracking));
@@ -109,6 +110,20 @@ pub(crate) fn run(options: &RunOptions) -> Result<(), Failure> {
         Err(Failure::work(end.text))
     } else {
         Ok(())
+    }
+}
+
+/// Puts what the design promises beside what was measured.
+fn promise(file: &LoopFile, record: &mut LoopRecord) {
+    let references: Vec<Vec<f64>> = record
+        .controlled
+        .iter()
+        .map(|trace| trace.reference.clone())
+        .collect();
+    if let Some(ideal) = file.controller.ideal(&references, file.period_s) {
+        for (trace, ideal) in record.controlled.iter_mut().zip(ideal) {
+            trace.ideal = Some(ideal);
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::{DesignError, FeedbackLinearizingPi};
-use crate::{PiResponse, Rule, Singular, gains, solve};
+use crate::{PiResponse, Rule, SampledPi, Singular, gains, solve};
 
 /// One number for all channels, or a list of one per channel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -371,5 +371,71 @@ impl ControllerPart for FeedbackLinearizingPiSettings {
         }
         notes
     }
+
+    /// The response of `H(s)`, or of `u' = ν` under the constant acceleration. The sampled law is
+    /// `H(s)` at every sample, so running it on the bare integrator gives it without an error.
+    fn ideal(&self, references: &[Vec<f64>], period: f64) -> Option<Vec<Vec<f64>>> {
+        match self.demand(Some(references.len())).ok()? {
+            Demand::Gains(gains) => references
+                .iter()
+                .zip(gains)
+                .map(|(reference, (kp, ki))| {
+                    let law = SampledPi::new(kp, ki, period)?;
+                    let (mut u, mut z) = (0.0, 0.0);
+                    let follow = |r: &f64| {
+                        let (now, error) = (u, r - u);
+                        u += period * (law.proportional * (law.reference_weight * r - u) + z);
+                        z += law.integral * period * error;
+                        now
+                    };
+                    Some(reference.iter().map(follow).collect())
+                })
+                .collect(),
+            Demand::Acceleration(acceleration) => Some(
+                acceleration
+                    .iter()
+                    .zip(references)
+                    .map(|(a, reference)| {
+                        (0..reference.len())
+                            .map(|k| a * period * k as f64)
+                            .collect()
+                    })
+                    .collect(),
+            ),
+        }
+    }
 }
 declare_part!(&META);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ideal_response_is_that_of_h() {
+        let settings = FeedbackLinearizingPiSettings {
+            settling_time_s: Some(PerChannel::All(0.45)),
+            ..Default::default()
+        };
+        let (kp, ki) = gains(Rule::Paper, 0.45, 1.0).unwrap();
+        let response = PiResponse::new(kp, ki).unwrap();
+        let (up, down) = (vec![0.2; 100], vec![-1.3; 100]);
+        let ideal = settings.ideal(&[up, down], 0.01).unwrap();
+        for k in 0..100 {
+            let share = 1.0 - response.error(0.01 * k as f64);
+            assert!((ideal[0][k] - 0.2 * share).abs() < 1e-12);
+            assert!((ideal[1][k] + 1.3 * share).abs() < 1e-12);
+        }
+        let settings = FeedbackLinearizingPiSettings {
+            open_loop_acceleration: Some(vec![0.6, 0.0]),
+            ..Default::default()
+        };
+        let ideal = settings.ideal(&[vec![0.0; 3], vec![0.0; 3]], 0.01).unwrap();
+        assert_eq!(ideal[1], [0.0; 3]);
+        assert!((ideal[0][2] - 0.012).abs() < 1e-15);
+        assert_eq!(
+            FeedbackLinearizingPiSettings::default().ideal(&[], 0.01),
+            None
+        );
+    }
+}
