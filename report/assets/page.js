@@ -66,10 +66,17 @@
       modebar: { bgcolor: "rgba(0,0,0,0)", color: theme.soft, activecolor: theme.ink },
       xaxis: {
         gridcolor: theme.grid, linecolor: theme.zero, zeroline: false, anchor: chart.panels.length > 1 ? `y${chart.panels.length}` : "y",
-        title: { text: escape(chart.x_title), standoff: 4 }, hoverformat: ".5~g", ticks: "outside", ticklen: 3, tickcolor: theme.zero,
+        ...(!chart.small && { title: { text: escape(chart.x_title), standoff: 4 } }), hoverformat: ".5~g", ticks: "outside", ticklen: 3, tickcolor: theme.zero,
         showspikes: true, spikethickness: 1, spikedash: "dot", spikecolor: theme.zero, spikemode: "across",
       },
     };
+    if (chart.small) {
+      // Names can be as long as a small chart is wide: from its right edge to the left.
+      out.annotations.push({
+        text: escape(chart.x_title), xref: "paper", yref: "paper", x: 1, y: 0, xanchor: "right", yanchor: "top", showarrow: false,
+        font: { size: 11, color: theme.soft }, xshift: 8, yshift: -21,
+      });
+    }
     let from = 0;
     chart.panels.forEach((panel, at) => {
       const high = 1 - (from + title) / height, low = 1 - (from + title + panel.height) / height;

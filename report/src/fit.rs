@@ -8,7 +8,7 @@ use crate::chart::{Abscissae, Chart, Role, Trace};
 use crate::comparison;
 use crate::html::{escape, identifier, list, table};
 use crate::intervals::{self, Interval};
-use crate::numbers::{axis, percent, plain, rounded_times, significant, with_error};
+use crate::numbers::{axis, percent, plain, powers, rounded_times, significant, with_error};
 use crate::page::{Context, page, section};
 use crate::thin::{MOST_POINTS, kept};
 
@@ -141,7 +141,7 @@ impl Found<'_> {
         if !held.is_empty() {
             let rows: Vec<Vec<String>> = held
                 .iter()
-                .map(|(name, e)| vec![identifier(name), plain(e.value), escape(&e.unit)])
+                .map(|(name, e)| vec![identifier(name), plain(e.value), escape(&powers(&e.unit))])
                 .collect();
             let table = table(
                 &["parameter", "value", "unit"],
@@ -209,7 +209,7 @@ fn estimates(parameters: &[(&String, &Estimate)]) -> String {
             vec![
                 identifier(name),
                 value,
-                escape(&e.unit),
+                escape(&powers(&e.unit)),
                 error,
                 interval,
                 format!(

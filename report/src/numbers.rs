@@ -48,6 +48,8 @@ pub(crate) fn percent(share: f64) -> String {
         "–".into()
     } else if percent.abs() >= 9.95 || percent == 0.0 {
         format!("{percent:.0}\u{a0}%").replace('-', "−")
+    } else if percent.abs() < 0.095 {
+        format!("{}\u{a0}%", show(percent, 1))
     } else {
         format!("{percent:.1}\u{a0}%").replace('-', "−")
     }
@@ -86,8 +88,13 @@ pub(crate) fn quantity(number: &str, unit: &str) -> String {
     if unit.is_empty() || unit == "1" {
         number.into()
     } else {
-        format!("{number}\u{a0}{unit}")
+        format!("{number}\u{a0}{}", powers(unit))
     }
+}
+
+/// A unit with its powers raised: `m/rad²` for `m/rad^2`.
+pub(crate) fn powers(unit: &str) -> String {
+    unit.replace("^2", "²").replace("^3", "³")
 }
 
 /// `name, unit` for an axis.
@@ -95,7 +102,7 @@ pub(crate) fn axis(name: &str, unit: &str) -> String {
     if unit.is_empty() || unit == "1" {
         name.into()
     } else {
-        format!("{name}, {unit}")
+        format!("{name}, {}", powers(unit))
     }
 }
 
@@ -152,7 +159,9 @@ mod tests {
         assert_eq!(signed(-0.031, 2), "−0.031");
         assert_eq!(percent(0.7312), "73\u{a0}%");
         assert_eq!(percent(0.0042), "0.4\u{a0}%");
+        assert_eq!(percent(0.000_068), "0.007\u{a0}%");
         assert_eq!(percent(f64::NAN), "–");
+        assert_eq!(axis("K_B", "m/rad^2"), "K_B, m/rad²");
         assert_eq!(tenths(-3.25), "−3.2\u{a0}%");
         assert_eq!(plain(0.05), "0.05");
         assert_eq!(plain(-1e-9), "−1.00000·10⁻⁹");

@@ -40,7 +40,8 @@ fn sentence(record: &LoopRecord) -> String {
     if n == 0 {
         return with_end("The loop did not complete a single tick.".into(), record);
     }
-    let duration = record.time[n - 1] - record.time[0];
+    // The last tick, too, lasts a period.
+    let duration = record.time[n - 1] - record.time[0] + record.period_s;
     let mut text = format!(
         "The loop ran for {} in {n} ticks of {}.",
         quantity(&plain(duration), "s"),
@@ -212,7 +213,7 @@ mod tests {
         let record = loop_record(1000);
         let page = without_library(&run_page(&context(), &record));
         for text in [
-            "The loop ran for 9.99\u{a0}s in 1000 ticks of 10\u{a0}ms.",
+            "The loop ran for 10\u{a0}s in 1000 ticks of 10\u{a0}ms.",
             "The inputs were saturated",
             "It ended: the reference ended.",
             "Settling time asked for 0.45 s",
