@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use loopsight_diagnosis::{Comparison, Fit};
+use loopsight_diagnosis::{Comparison, Fit, Verdict};
 use loopsight_recordings::{Fault, Severity};
 use serde::Serialize;
 
@@ -137,21 +137,27 @@ pub(crate) fn fit(fit: &Fit) -> String {
                     || "-".to_owned(),
                     |[low, high]| format!("{} … {}", number(low), number(high)),
                 ),
-                p.verdict.text().to_owned(),
             ]
         })
         .collect();
     let mut text = table(
-        &[
-            "parameter",
-            "value",
-            "unit",
-            "std error",
-            "95 % interval",
-            "verdict",
-        ],
+        &["parameter", "value", "unit", "std error", "95 % interval"],
         &rows,
     );
+    // Below the table: beside it, they would make it wider than a terminal.
+    let mut verdicts: Vec<(Verdict, Vec<&str>)> = Vec::new();
+    for (name, p) in &fit.parameters {
+        match verdicts
+            .iter_mut()
+            .find(|(verdict, _)| *verdict == p.verdict)
+        {
+            Some((_, names)) => names.push(name),
+            None => verdicts.push((p.verdict, vec![name])),
+        }
+    }
+    for (verdict, names) in &verdicts {
+        text.push_str(&format!("\n{}: {}", verdict.text(), names.join(", ")));
+    }
     for flat in &fit.flat {
         text.push_str(&format!("\nnot determined: {flat}"));
     }

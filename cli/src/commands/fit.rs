@@ -97,9 +97,23 @@ fn fitted_text(loaded: &Loaded, fit: &Fit) -> String {
         .iter()
         .zip(&loaded.model.parameters)
         .filter(|(new, old)| old.free && new.value != old.value)
-        .filter_map(|(new, _)| Some((new.path.clone(), new.value?)))
+        .filter_map(|(new, _)| {
+            let error = fit.parameters.get(&new.name).and_then(|p| p.std_error);
+            Some((new.path.clone(), legible(new.value?, error)))
+        })
         .collect();
     loaded.source.with_values(&values)
+}
+
+/// `value` to about a thousandth of its standard error: the digits behind that are noise.
+fn legible(value: f64, std_error: Option<f64>) -> f64 {
+    match std_error {
+        Some(error) if error > 0.0 && error.is_finite() => {
+            let decimals = (3.0 - error.log10().floor()).clamp(0.0, 17.0) as usize;
+            format!("{value:.decimals$}").parse().unwrap_or(value)
+        }
+        _ => value,
+    }
 }
 
 fn context(options: &FitOptions, loaded: &Loaded) -> Context {
@@ -122,5 +136,17 @@ fn context(options: &FitOptions, loaded: &Loaded) -> Context {
         log_file: shown.display().to_string(),
         notes,
         command: output::command_line(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_below_the_noise_are_dropped() {
+        assert_eq!(legible(-15.146_524_758_853, Some(5.2e-4)), -15.146_524_8);
+        assert_eq!(legible(12_345.678_9, Some(2.0e5)), 12_346.0);
+        assert_eq!(legible(0.136_003_798_643, None), 0.136_003_798_643);
     }
 }

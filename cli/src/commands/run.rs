@@ -302,7 +302,10 @@ impl Recorder {
                 let signal = composed.controlled.get(row);
                 innovations.push(InnovationTrace {
                     id: signal.map_or_else(String::new, |s| s.id.to_owned()),
-                    unit: signal.map_or_else(String::new, |s| format!("{}/s", s.unit)),
+                    unit: signal.map_or_else(String::new, |s| match s.unit.strip_suffix("/s") {
+                        Some(of) => format!("{of}/s^2"),
+                        None => format!("{}/s", s.unit),
+                    }),
                     values: room(),
                 });
             }

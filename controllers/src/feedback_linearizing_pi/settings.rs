@@ -328,7 +328,8 @@ impl ControllerPart for FeedbackLinearizingPiSettings {
         match self.demand(None) {
             Err(_) => {}
             Ok(Demand::Acceleration(acceleration)) => notes.push(format!(
-                "open loop: constant accelerations {acceleration:?}, the reference is not followed"
+                "open loop: constant accelerations {acceleration:?} until an input is clipped; the \
+                 reference is not followed"
             )),
             Ok(Demand::Gains(gains)) => {
                 let asked = self
@@ -364,10 +365,8 @@ impl ControllerPart for FeedbackLinearizingPiSettings {
             }
         }
         if let Some(limit) = &self.limit {
-            notes.push(format!(
-                "inputs are clipped at ±{:?}; the times above hold below that",
-                limit.listed()
-            ));
+            let limits: Vec<String> = limit.listed().iter().map(|l| format!("±{l}")).collect();
+            notes.push(format!("inputs are clipped at {}", limits.join(", ")));
         }
         notes
     }
