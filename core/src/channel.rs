@@ -66,14 +66,18 @@ pub enum Role {
     Forward,
     /// Yaw rate of a vehicle.
     Yaw,
-    /// Load on the common supply: the sum of the magnitudes of all inputs, or of the currents
-    /// where the plant knows them.
+    /// Load on the common supply: the sum of the magnitudes of the currents, or of what stands for
+    /// them.
     Load,
+    /// Voltage over the winding of this channel's motor, proportional to its current.
+    Armature,
+    /// Acceleration by turning, per unit of the centre of mass's offset.
+    Centrifugal,
 }
 
 impl Role {
     /// Number of roles.
-    pub const COUNT: usize = 7;
+    pub const COUNT: usize = 9;
     /// All of them, in order.
     pub const ALL: [Role; Role::COUNT] = [
         Role::Flow,
@@ -83,6 +87,8 @@ impl Role {
         Role::Forward,
         Role::Yaw,
         Role::Load,
+        Role::Armature,
+        Role::Centrifugal,
     ];
 
     /// Name used in messages.
@@ -95,6 +101,8 @@ impl Role {
             Role::Forward => "forward speed",
             Role::Yaw => "yaw rate",
             Role::Load => "supply load",
+            Role::Armature => "armature voltage",
+            Role::Centrifugal => "acceleration by turning",
         }
     }
 }

@@ -173,10 +173,10 @@ impl Source {
             .any(|w| message.starts_with(w));
         if unknown || message.starts_with("field ") {
             // Depending on where serde noticed, the path ends above the key or with it.
-            if let Some(name) = names.first().map(|n| Step::Key(n.clone())) {
-                if path.last() != Some(&name) {
-                    path.push(name);
-                }
+            if let Some(name) = names.first().map(|n| Step::Key(n.clone()))
+                && path.last() != Some(&name)
+            {
+                path.push(name);
             }
         }
         if unknown {

@@ -28,7 +28,13 @@ mod tick;
 pub mod unit;
 
 #[cfg(feature = "std")]
+mod affine;
+#[cfg(feature = "std")]
+mod attach;
+#[cfg(feature = "std")]
 pub mod config;
+#[cfg(feature = "std")]
+mod configured;
 #[cfg(feature = "std")]
 pub mod excitation;
 #[cfg(feature = "std")]

@@ -1,13 +1,14 @@
 //! A model: a plant with effects, sensors and parameter values, composed from TOML.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
+pub use crate::affine::Affine;
+pub use crate::attach::misfit;
+use crate::attach::{attach, make_names_unique};
 use crate::config::{ConfigError, ReadError, Source, Step, nearest, read_text};
-use crate::controller::AffineModel;
 use crate::registry::{AnyDynamics, AnyPhysics, EffectPart, HostReal, PlantPart};
 use crate::run::LogMap;
 use crate::sensor::Sensor;
@@ -170,7 +171,7 @@ pub fn signals(plant: &'static PlantMeta) -> impl Iterator<Item = &'static Signa
     plant.states.iter().chain(plant.inputs).chain(plant.outputs)
 }
 
-fn signal_index(plant: &'static PlantMeta, id: &str) -> Option<usize> {
+pub(crate) fn signal_index(plant: &'static PlantMeta, id: &str) -> Option<usize> {
     signals(plant).position(|s| s.id == id)
 }
 
@@ -338,6 +339,13 @@ impl Model {
         })
     }
 
+    /// Index of the signal that is the integral of the signal `index`, if the plant has it.
+    pub fn integral_of(&self, index: usize) -> Option<usize> {
+        let id = signals(self.plant).nth(index)?.id;
+        let (_, integral) = self.plant.integrals.iter().find(|(rate, _)| *rate == id)?;
+        signal_index(self.plant, integral)
+    }
+
     /// Values of all parameters, in order; NaN where none is known yet.
     pub fn values(&self) -> Vec<f64> {
         self.parameters
@@ -460,138 +468,6 @@ pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         .ok()
 }
 
-fn attach(
-    plant: &'static PlantMeta,
-    part: &dyn EffectPart,
-    index: usize,
-    parameters: &mut Vec<ModelParameter>,
-    source: &Source,
-) -> Result<Attached, Box<ConfigError>> {
-    let meta = part.meta();
-    let base: Vec<Step> = vec!["effect".into(), index.into(), meta.id.into()];
-    let path = |more: &[Step]| -> Vec<Step> { base.iter().chain(more).cloned().collect() };
-    if part.at().is_empty() {
-        let fitting = fitting_channels(plant, meta);
-        return Err(source.error(
-            &base,
-            &format!("`{}` needs `at`: the channels it acts on", meta.id),
-            Some(format!(
-                "channels of `{}` where it fits: {}",
-                plant.id,
-                fitting.join(", ")
-            )),
-        ));
-    }
-    let mut at = Vec::new();
-    let mut reads = Vec::new();
-    for (i, id) in part.at().iter().enumerate() {
-        let channel = plant
-            .channels
-            .iter()
-            .find(|c| c.id == id.as_str())
-            .ok_or_else(|| {
-                let ids: Vec<&str> = plant.channels.iter().map(|c| c.id).collect();
-                source.error(
-                    &path(&["at".into(), i.into()]),
-                    &format!(
-                        "the plant `{}` has no channel `{id}`, expected one of {}",
-                        plant.id,
-                        ids.join(", ")
-                    ),
-                    nearest(id, ids).map(|n| format!("did you mean `{n}`?")),
-                )
-            })?;
-        if let Some(why) = misfit(channel, meta) {
-            let fitting = fitting_channels(plant, meta);
-            return Err(source.error(
-                &path(&["at".into(), i.into()]),
-                &format!("`{}` cannot act on `{id}`: {why}", meta.id),
-                Some(format!("channels where it fits: {}", fitting.join(", "))),
-            ));
-        }
-        let mut bound = [None; Role::COUNT];
-        for role in meta.reads {
-            bound[*role as usize] = channel.read(*role).and_then(|s| signal_index(plant, s));
-        }
-        at.push(channel);
-        reads.push(bound);
-    }
-    let first_parameter = parameters.len();
-    for (declaration, given) in meta.parameters.iter().zip(&part.values().given) {
-        parameters.push(ModelParameter {
-            name: format!("{}.{}", meta.id, declaration.id),
-            declaration,
-            unit: declaration
-                .unit
-                .replace("channel", at.first().map_or("1", |c| c.unit)),
-            value: given.or(declaration.default),
-            free: declaration.estimated,
-            path: path(&[declaration.id.into()]),
-        });
-    }
-    Ok(Attached {
-        meta,
-        at,
-        first_parameter,
-        physics: part.physics(),
-        reads,
-    })
-}
-
-/// Why an effect cannot act on a channel; `None` when it can.
-pub fn misfit(channel: &Channel, effect: &EffectMeta) -> Option<String> {
-    let kind = channel.place.kind();
-    if !effect.places.contains(&kind) {
-        let kinds: Vec<&str> = effect.places.iter().map(|p| p.name()).collect();
-        return Some(format!(
-            "it is a place of kind `{}`, expected `{}`",
-            kind.name(),
-            kinds.join("` or `")
-        ));
-    }
-    effect
-        .reads
-        .iter()
-        .find(|role| channel.read(**role).is_none())
-        .map(|role| {
-            format!(
-                "the effect reads the {}, which this channel does not offer",
-                role.name()
-            )
-        })
-}
-
-fn fitting_channels(plant: &PlantMeta, effect: &EffectMeta) -> Vec<&'static str> {
-    plant
-        .channels
-        .iter()
-        .filter(|c| misfit(c, effect).is_none())
-        .map(|c| c.id)
-        .collect()
-}
-
-/// Two instances of one effect are told apart by their channels.
-fn make_names_unique(parameters: &mut [ModelParameter], effects: &[Attached], first: usize) {
-    let mut count: BTreeMap<String, usize> = BTreeMap::new();
-    for parameter in &parameters[first..] {
-        *count.entry(parameter.name.clone()).or_default() += 1;
-    }
-    for effect in effects {
-        for (i, declaration) in effect.meta.parameters.iter().enumerate() {
-            let parameter = &mut parameters[effect.first_parameter + i];
-            if count.get(&parameter.name).copied().unwrap_or(0) > 1 {
-                let channels: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
-                parameter.name = format!(
-                    "{}@{}.{}",
-                    effect.meta.id,
-                    channels.join("+"),
-                    declaration.id
-                );
-            }
-        }
-    }
-}
-
 fn check_inputs(
     plant: &'static PlantMeta,
     log: &LogMap,
@@ -612,65 +488,4 @@ fn check_inputs(
         }
     }
     Ok(())
-}
-
-/// A model as a velocity controller sees it: `dy/dt = f(y) + G(y) u` in the controlled states,
-/// found by probing the plant at zero and at unit inputs.
-#[derive(Clone)]
-pub struct Affine {
-    model: Model,
-    p: Vec<f64>,
-    x: Vec<f64>,
-    u: Vec<f64>,
-    w: Vec<f64>,
-    dx: Vec<f64>,
-}
-
-impl Model {
-    /// The control-affine view with the model's present values; `None` where the plant declares
-    /// no controlled states.
-    pub fn affine(&self) -> Option<Affine> {
-        if self.plant.controlled.is_empty() {
-            return None;
-        }
-        Some(Affine {
-            p: self.lower(&self.values()),
-            x: vec![0.0; self.n_states()],
-            u: vec![0.0; self.plant.inputs.len()],
-            w: vec![0.0; self.n_efforts()],
-            dx: vec![0.0; self.n_states()],
-            model: self.clone(),
-        })
-    }
-}
-
-impl AffineModel<f64> for Affine {
-    fn size(&self) -> usize {
-        self.model.plant.controlled.len()
-    }
-
-    fn evaluate(&mut self, y: &[f64], drift: &mut [f64], input_matrix: &mut [f64]) {
-        let controlled = self.model.plant.controlled;
-        let dynamics = f64::dynamics(self.model.dynamics);
-        let n = controlled.len();
-        if y.len() != n || drift.len() != n || input_matrix.len() != n * n {
-            return;
-        }
-        for (state, value) in controlled.iter().zip(y) {
-            self.x[*state] = *value;
-        }
-        self.u.fill(0.0);
-        dynamics.derivative(&self.x, &self.u, &self.w, &self.p, &mut self.dx);
-        for (row, state) in controlled.iter().enumerate() {
-            drift[row] = self.dx[*state];
-        }
-        for column in 0..n {
-            self.u.fill(0.0);
-            self.u[column] = 1.0;
-            dynamics.derivative(&self.x, &self.u, &self.w, &self.p, &mut self.dx);
-            for (row, state) in controlled.iter().enumerate() {
-                input_matrix[row * n + column] = self.dx[*state] - drift[row];
-            }
-        }
-    }
 }

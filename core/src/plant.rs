@@ -23,6 +23,9 @@ pub struct PlantMeta {
     pub inputs: &'static [Signal],
     /// Further signals that a sensor could measure or an effect could read.
     pub outputs: &'static [Signal],
+    /// Signals that are integrals of others: `(rate, integral)`. A sensor that reads the mean of the
+    /// rate reads a difference of the integral.
+    pub integrals: &'static [(&'static str, &'static str)],
     /// The places where effects attach. Effort channels are numbered from 0 without gaps.
     pub channels: &'static [Channel],
     /// The parameters of the equations, in the order of `p`.

@@ -85,6 +85,9 @@ pub struct Step<'a, S> {
     pub outcome: Command,
 }
 
+/// When, how fresh the sample was, and what the controller says.
+type Advance<S> = (Tick<S>, Sample<S>, Command);
+
 impl<S, D, C, M, O, K, B> Loop<S, D, C, M, O, K, B>
 where
     S: Real,
@@ -156,10 +159,7 @@ where
         }
     }
 
-    fn advance(
-        &mut self,
-        reference: &[S],
-    ) -> Result<(Tick<S>, Sample<S>, Command), TickError<D::Error>> {
+    fn advance(&mut self, reference: &[S]) -> Result<Advance<S>, TickError<D::Error>> {
         let tick = Tick {
             index: self.index,
             time: S::of(self.index as f64 * self.period),

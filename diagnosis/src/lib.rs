@@ -3,6 +3,7 @@
 
 mod compare;
 pub mod fit;
+mod flatness;
 mod noise;
 mod output_error;
 mod prediction;

@@ -15,6 +15,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::compare::Comparison;
 use crate::fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
+use crate::flatness::{DEAD, Flatness, Named};
 use crate::noise::{self, Block};
 use crate::prediction::{InitialStates, predict, residuals, sensitivities, visible_states};
 use crate::regression::batch;
@@ -62,6 +63,9 @@ const SLOW: f64 = 0.3;
 /// Spans of the regressions that a fit may start from, s.
 const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
 
+/// Unknowns, weighted residuals there, and their Jacobian.
+type Linearised = (DVector<f64>, DVector<f64>, DMatrix<f64>);
+
 struct Problem<'a> {
     model: &'a Model,
     runs: &'a [Run],
@@ -79,7 +83,7 @@ struct Problem<'a> {
     /// Moving-average coefficient by signal; empty in the first pass.
     rounding: Vec<f64>,
     evaluations: Cell<u64>,
-    cache: RefCell<Option<(DVector<f64>, DMatrix<f64>)>>,
+    cache: RefCell<Option<Linearised>>,
     samples: f64,
 }
 
@@ -340,10 +344,10 @@ impl<'a> Problem<'a> {
 
     /// Weighted residuals, and their Jacobian by the scaled unknowns.
     fn linearise(&self, scaled: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
-        if let Some((at, jacobian)) = self.cache.borrow().as_ref() {
-            if at == scaled {
-                return (self.residual_vector(scaled), jacobian.clone());
-            }
+        if let Some((at, residual, jacobian)) = self.cache.borrow().as_ref()
+            && at == scaled
+        {
+            return (residual.clone(), jacobian.clone());
         }
         let (values, states) = self.unpack(scaled);
         let n_free = self.free.len();
@@ -375,7 +379,7 @@ impl<'a> Problem<'a> {
             self.filter_jacobian(index, first_row, rows, &mut jacobian);
             first_row += rows;
         }
-        *self.cache.borrow_mut() = Some((scaled.clone(), jacobian.clone()));
+        *self.cache.borrow_mut() = Some((scaled.clone(), all.clone(), jacobian.clone()));
         (all, jacobian)
     }
 
@@ -418,7 +422,7 @@ impl<'a> Problem<'a> {
         let quantile = StudentsT::new(0.0, 1.0, (self.samples - norms.len() as f64).max(1.0))
             .map_or(1.96, |t| t.inverse_cdf(0.975));
 
-        let flatness = Flatness::of(self, &gram, &norms);
+        let flatness = Flatness::of(&gram, &norms, &self.named());
         let blocks = self.blocks(&residual, &jacobian);
         let inverse = flatness.inverse(&norms);
         let covariance =
@@ -478,6 +482,22 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// The estimated parameters, for what is said of flat directions.
+    fn named(&self) -> Vec<Named<'_>> {
+        self.free
+            .iter()
+            .zip(&self.scales)
+            .map(|(i, scale)| {
+                let parameter = &self.model.parameters[*i];
+                Named {
+                    name: &parameter.name,
+                    declared: parameter.declaration.scale,
+                    scale: *scale,
+                }
+            })
+            .collect()
+    }
+
     /// Residuals and Jacobian by run and signal, in time order.
     fn blocks(&self, residual: &DVector<f64>, jacobian: &DMatrix<f64>) -> Vec<Vec<Block>> {
         let n_signals = self.weights.len();
@@ -500,109 +520,6 @@ impl<'a> Problem<'a> {
                 blocks
             })
             .collect()
-    }
-}
-
-/// Directions in which the data say nothing.
-struct Flatness {
-    dead: Vec<bool>,
-    flat: Vec<bool>,
-    words: Vec<String>,
-    vectors: DMatrix<f64>,
-    values: DVector<f64>,
-}
-
-/// A singular value of the column-normalised Jacobian below this: the direction is flat.
-const FLAT: f64 = 1e-6;
-/// A change of a parameter by its scale that moves the weighted outputs by less than this is dead.
-const DEAD: f64 = 1e-9;
-
-impl Flatness {
-    fn of(problem: &Problem<'_>, gram: &DMatrix<f64>, norms: &[f64]) -> Self {
-        let n = norms.len();
-        // The unknowns are balanced: a dead one is dead on the scale of its declaration.
-        let dead: Vec<bool> = norms
-            .iter()
-            .enumerate()
-            .map(|(i, norm)| {
-                let natural = problem.free.get(i).map_or(1.0, |p| {
-                    let declared = problem.model.parameters[*p].declaration.scale;
-                    declared / problem.scales[i]
-                });
-                !(*norm * natural > DEAD)
-            })
-            .collect();
-        let mut normalised = gram.clone();
-        for i in 0..n {
-            for j in 0..n {
-                normalised[(i, j)] = if dead[i] || dead[j] {
-                    f64::from(u8::from(i == j))
-                } else {
-                    gram[(i, j)] / (norms[i] * norms[j])
-                };
-            }
-        }
-        let eigen = normalised.symmetric_eigen();
-        let mut flat = vec![false; n];
-        let mut words = Vec::new();
-        for (k, value) in eigen.eigenvalues.iter().enumerate() {
-            // Eigenvalues are squares of singular values.
-            if *value > FLAT * FLAT {
-                continue;
-            }
-            let mut terms = Vec::new();
-            for (i, index) in problem.free.iter().enumerate() {
-                let share = eigen.eigenvectors[(i, k)];
-                if share.abs() > 0.1 {
-                    flat[i] = true;
-                    let change = share / norms[i] * problem.scales[i];
-                    terms.push((index, change));
-                }
-            }
-            let largest = terms.iter().fold(0.0f64, |a, (_, c)| a.max(c.abs()));
-            let text: Vec<String> = terms
-                .iter()
-                .map(|(index, change)| {
-                    format!(
-                        "{:+.3} {}",
-                        change / largest,
-                        problem.model.parameters[**index].name
-                    )
-                })
-                .collect();
-            if !text.is_empty() {
-                words.push(format!("moving along {} changes nothing", text.join(" ")));
-            }
-        }
-        Self {
-            dead,
-            flat,
-            words,
-            vectors: eigen.eigenvectors,
-            values: eigen.eigenvalues,
-        }
-    }
-
-    /// `(JᵀJ)⁻¹` without the flat directions.
-    fn inverse(&self, norms: &[f64]) -> DMatrix<f64> {
-        let n = norms.len();
-        let mut inverse = DMatrix::zeros(n, n);
-        for (k, value) in self.values.iter().enumerate() {
-            if *value > FLAT * FLAT {
-                let v = self.vectors.column(k);
-                inverse += v * v.transpose() / *value;
-            }
-        }
-        for i in 0..n {
-            for j in 0..n {
-                inverse[(i, j)] = if self.dead[i] || self.dead[j] {
-                    0.0
-                } else {
-                    inverse[(i, j)] / (norms[i] * norms[j])
-                };
-            }
-        }
-        inverse
     }
 }
 

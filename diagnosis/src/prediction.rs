@@ -133,7 +133,7 @@ impl InitialStates {
                     candidate[*state] += step[k];
                 }
                 let after = cost(&candidate);
-                if !(after < best) {
+                if after >= best || after.is_nan() {
                     break;
                 }
                 let done = best - after <= 1e-12 * best;

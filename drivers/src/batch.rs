@@ -241,7 +241,7 @@ mod tests {
     #[test]
     fn an_unstable_robot_is_named() {
         let model = model(
-            "[plant.dc_axis]\nK_A = 9000.0\nK_C = 8.0\n[log.measured.speed]\nsensor = \"instantaneous\"\n",
+            "[plant.dc_axis]\nK_A = -90000.0\nK_C = 8.0\n[log.measured.speed]\nsensor = \"instantaneous\"\n",
         );
         let error =
             simulate_inputs(&model, &Simulated::default(), &[0.0, 1.0], &[1.0; 2]).unwrap_err();

@@ -108,11 +108,12 @@ const PHYSICAL: [Parameter; 7] = [
     .scaled(1e-5),
 ];
 
-const READS: [Reads; 4] = [
+const READS: [Reads; 5] = [
     Reads(Role::Flow, "speed"),
     Reads(Role::Position, "angle"),
     Reads(Role::Drive, "voltage"),
     Reads(Role::Load, "supply_load"),
+    Reads(Role::Armature, "armature"),
 ];
 
 const CHANNELS: [Channel; 6] = [
@@ -172,7 +173,7 @@ const CHANNELS: [Channel; 6] = [
     },
 ];
 
-impl Plant<2, 1, 2, 2, 1> for DcAxis {
+impl Plant<2, 1, 2, 2, 2> for DcAxis {
     const META: PlantMeta = PlantMeta {
         id: "dc_axis",
         summary: "an axis driven by one DC motor",
@@ -185,12 +186,21 @@ impl Plant<2, 1, 2, 2, 1> for DcAxis {
             Signal::new("angle", "φ", "rad", "angle of the shaft"),
         ],
         inputs: &[Signal::new("voltage", "V", "V", "voltage on the motor")],
-        outputs: &[Signal::new(
-            "supply_load",
-            "|V|",
-            "V",
-            "load on the supply: magnitude of the voltage",
-        )],
+        outputs: &[
+            Signal::new(
+                "supply_load",
+                "|U|",
+                "V",
+                "load on the supply: magnitude of the armature voltage",
+            ),
+            Signal::new(
+                "armature",
+                "U",
+                "V",
+                "voltage over the motor's winding, V less what K_A takes at this speed",
+            ),
+        ],
+        integrals: &[("speed", "angle")],
         channels: &CHANNELS,
         parameters: &LUMPED,
         parameterizations: &[Parameterization {
@@ -205,8 +215,15 @@ impl Plant<2, 1, 2, 2, 1> for DcAxis {
         [p[0] * x[0] + p[1] * (u[0] + w[0]) + w[1], x[0]]
     }
 
-    fn outputs<S: Real>(_x: &[S; 2], u: &[S; 1], _p: &[S; 2]) -> [S; 1] {
-        [u[0].abs()]
+    fn outputs<S: Real>(x: &[S; 2], u: &[S; 1], p: &[S; 2]) -> [S; 2] {
+        let [k_a, k_c] = *p;
+        // A motor without drive has no back-emf to speak of.
+        let armature = if k_c.abs() > S::of(1e-9) {
+            u[0] + k_a / k_c * x[0]
+        } else {
+            u[0]
+        };
+        [armature.abs(), armature]
     }
 
     fn lower<S: Real>(set: usize, from: &[S]) -> Option<[S; 2]> {
@@ -228,7 +245,7 @@ impl ControlAffine<1, 1, 2> for DcAxis {
     }
 }
 
-declare_plant!(DcAxis, "dc_axis", <2, 1, 2, 2, 1>);
+declare_plant!(DcAxis, "dc_axis", <2, 1, 2, 2, 2>);
 
 #[cfg(test)]
 mod tests {

@@ -1,9 +1,10 @@
 //! Differential-drive mobile robot with DC motors.
 
-use loopsight_core::{
-    Channel, ControlAffine, Parameter, Parameterization, Place, Plant, PlantMeta, Reads, Real,
-    Role, Signal, declare_plant,
-};
+mod tables;
+
+use loopsight_core::{ControlAffine, Parameterization, Plant, PlantMeta, Real, declare_plant};
+
+use tables::{CHANNELS, INPUTS, INTEGRALS, LUMPED, OUTPUTS, PHYSICAL, STATES};
 
 /// Differential-drive mobile robot (DDMR) with DC motors, pose included.
 ///
@@ -103,371 +104,7 @@ impl Ddmr {
     }
 }
 
-const LUMPED: [Parameter; 8] = [
-    Parameter::new(
-        "K_A",
-        "K_A",
-        "1/s",
-        "forward damping: back-emf and viscous friction over mass",
-    )
-    .within(f64::NEG_INFINITY, 0.0)
-    .scaled(1.0),
-    Parameter::new(
-        "K_B",
-        "K_B",
-        "m/rad^2",
-        "forward acceleration by turning: centre of mass ahead of the axle",
-    )
-    .scaled(0.1),
-    Parameter::new(
-        "K_C",
-        "K_C",
-        "m/s^2/V",
-        "forward acceleration per volt on each motor",
-    )
-    .scaled(0.1),
-    Parameter::new(
-        "K_D",
-        "K_D",
-        "1/s",
-        "yaw damping: back-emf and viscous friction over inertia",
-    )
-    .within(f64::NEG_INFINITY, 0.0)
-    .scaled(1.0),
-    Parameter::new(
-        "K_E",
-        "K_E",
-        "1/m",
-        "yaw acceleration by turning while driving: centre of mass off the axle",
-    )
-    .scaled(1.0),
-    Parameter::new(
-        "K_F",
-        "K_F",
-        "rad/s^2/V",
-        "yaw acceleration per volt of difference",
-    )
-    .scaled(0.1),
-    Parameter::new(
-        "half_track",
-        "b",
-        "m",
-        "half the distance between the wheels",
-    )
-    .above(0.0)
-    .known()
-    .nonlinear()
-    .scaled(0.1),
-    Parameter::new("wheel_radius", "r", "m", "wheel radius")
-        .above(0.0)
-        .known()
-        .nonlinear()
-        .scaled(0.1),
-];
-
-const PHYSICAL: [Parameter; 11] = [
-    Parameter::new("mass", "m", "kg", "mass of the robot, wheels included")
-        .above(0.0)
-        .nonlinear(),
-    Parameter::new(
-        "yaw_inertia",
-        "I",
-        "kg m^2",
-        "moment of inertia about the vertical axis through the centre of mass",
-    )
-    .above(0.0)
-    .nonlinear()
-    .scaled(0.1),
-    Parameter::new("mass_offset", "d", "m", "centre of mass ahead of the axle")
-        .or(0.0)
-        .nonlinear()
-        .scaled(0.01),
-    Parameter::new("wheel_radius", "r", "m", "wheel radius")
-        .above(0.0)
-        .known()
-        .nonlinear()
-        .scaled(0.1),
-    Parameter::new(
-        "half_track",
-        "b",
-        "m",
-        "half the distance between the wheels",
-    )
-    .above(0.0)
-    .known()
-    .nonlinear()
-    .scaled(0.1),
-    Parameter::new(
-        "torque_constant",
-        "K_T",
-        "N m/A",
-        "torque constant of a motor",
-    )
-    .above(0.0)
-    .known()
-    .nonlinear()
-    .scaled(0.01),
-    Parameter::new(
-        "back_emf_constant",
-        "K_a",
-        "V s/rad",
-        "back-emf constant of a motor",
-    )
-    .above(0.0)
-    .known()
-    .nonlinear()
-    .scaled(0.01),
-    Parameter::new("resistance", "R_a", "Ohm", "armature resistance of a motor")
-        .above(0.0)
-        .known()
-        .nonlinear(),
-    Parameter::new(
-        "gear_ratio",
-        "n",
-        "1",
-        "wheel speed over motor speed, below 1 for a reduction gear",
-    )
-    .above(0.0)
-    .known()
-    .nonlinear()
-    .scaled(0.1),
-    Parameter::new(
-        "rotor_inertia",
-        "J",
-        "kg m^2",
-        "moment of inertia of a rotor",
-    )
-    .within(0.0, f64::INFINITY)
-    .or(0.0)
-    .known()
-    .nonlinear()
-    .scaled(1e-5),
-    Parameter::new(
-        "viscous_friction",
-        "f",
-        "N m s/rad",
-        "viscous friction at a rotor",
-    )
-    .within(0.0, f64::INFINITY)
-    .or(0.0)
-    .nonlinear()
-    .scaled(1e-5),
-];
-
-const STATES: [Signal; 6] = [
-    Signal::new(
-        "linear_velocity",
-        "v",
-        "m/s",
-        "forward speed midway between the wheels",
-    ),
-    Signal::new(
-        "angular_velocity",
-        "ω",
-        "rad/s",
-        "yaw rate, positive to the left",
-    ),
-    Signal::new("heading", "θ", "rad", "heading, positive to the left"),
-    Signal::new("travel", "s", "m", "distance travelled along the path"),
-    Signal::new("position_x", "x", "m", "position, x"),
-    Signal::new("position_y", "y", "m", "position, y"),
-];
-
-const INPUTS: [Signal; 2] = [
-    Signal::new("voltage_right", "V_r", "V", "voltage on the right motor"),
-    Signal::new("voltage_left", "V_l", "V", "voltage on the left motor"),
-];
-
-const OUTPUTS: [Signal; 7] = [
-    Signal::new(
-        "shaft_speed_right",
-        "φ'_r",
-        "rad/s",
-        "speed of the right wheel's shaft",
-    ),
-    Signal::new(
-        "shaft_speed_left",
-        "φ'_l",
-        "rad/s",
-        "speed of the left wheel's shaft",
-    ),
-    Signal::new(
-        "track_speed_right",
-        "v_r",
-        "m/s",
-        "speed of the right wheel over ground",
-    ),
-    Signal::new(
-        "track_speed_left",
-        "v_l",
-        "m/s",
-        "speed of the left wheel over ground",
-    ),
-    Signal::new(
-        "shaft_angle_right",
-        "φ_r",
-        "rad",
-        "angle of the right wheel's shaft since the start",
-    ),
-    Signal::new(
-        "shaft_angle_left",
-        "φ_l",
-        "rad",
-        "angle of the left wheel's shaft since the start",
-    ),
-    Signal::new(
-        "supply_load",
-        "ΣV",
-        "V",
-        "load on the common supply: sum of the magnitudes of both voltages",
-    ),
-];
-
-const WHEEL_RIGHT: [Reads; 7] = [
-    Reads(Role::Flow, "shaft_speed_right"),
-    Reads(Role::Position, "shaft_angle_right"),
-    Reads(Role::Drive, "voltage_right"),
-    Reads(Role::Heading, "heading"),
-    Reads(Role::Forward, "linear_velocity"),
-    Reads(Role::Yaw, "angular_velocity"),
-    Reads(Role::Load, "supply_load"),
-];
-const WHEEL_LEFT: [Reads; 7] = [
-    Reads(Role::Flow, "shaft_speed_left"),
-    Reads(Role::Position, "shaft_angle_left"),
-    Reads(Role::Drive, "voltage_left"),
-    Reads(Role::Heading, "heading"),
-    Reads(Role::Forward, "linear_velocity"),
-    Reads(Role::Yaw, "angular_velocity"),
-    Reads(Role::Load, "supply_load"),
-];
-const BODY_FORWARD: [Reads; 5] = [
-    Reads(Role::Flow, "linear_velocity"),
-    Reads(Role::Position, "travel"),
-    Reads(Role::Heading, "heading"),
-    Reads(Role::Forward, "linear_velocity"),
-    Reads(Role::Yaw, "angular_velocity"),
-];
-const BODY_YAW: [Reads; 5] = [
-    Reads(Role::Flow, "angular_velocity"),
-    Reads(Role::Position, "heading"),
-    Reads(Role::Heading, "heading"),
-    Reads(Role::Forward, "linear_velocity"),
-    Reads(Role::Yaw, "angular_velocity"),
-];
-
-const CHANNELS: [Channel; 12] = [
-    Channel {
-        id: "wheel.right",
-        place: Place::Effort(0),
-        unit: "V",
-        equation: "V_r -> V_r + w",
-        reads: &WHEEL_RIGHT,
-        side: 1,
-        doc: "shaft of the right wheel; efforts in volts of equivalent motor voltage",
-    },
-    Channel {
-        id: "wheel.left",
-        place: Place::Effort(1),
-        unit: "V",
-        equation: "V_l -> V_l + w",
-        reads: &WHEEL_LEFT,
-        side: -1,
-        doc: "shaft of the left wheel; efforts in volts of equivalent motor voltage",
-    },
-    Channel {
-        id: "body.forward",
-        place: Place::Effort(2),
-        unit: "m/s^2",
-        equation: "v' -> v' + w",
-        reads: &BODY_FORWARD,
-        side: 0,
-        doc: "the body along its heading; efforts as acceleration",
-    },
-    Channel {
-        id: "body.yaw",
-        place: Place::Effort(3),
-        unit: "rad/s^2",
-        equation: "ω' -> ω' + w",
-        reads: &BODY_YAW,
-        side: 0,
-        doc: "the body about the vertical; efforts as angular acceleration",
-    },
-    Channel {
-        id: "inertia.forward",
-        place: Place::Rate(0),
-        unit: "m/s^2",
-        equation: "v' -> v' + w(v')",
-        reads: &BODY_FORWARD,
-        side: 0,
-        doc: "the forward acceleration itself: where mass acts",
-    },
-    Channel {
-        id: "inertia.yaw",
-        place: Place::Rate(1),
-        unit: "rad/s^2",
-        equation: "ω' -> ω' + w(ω')",
-        reads: &BODY_YAW,
-        side: 0,
-        doc: "the yaw acceleration itself: where inertia acts",
-    },
-    Channel {
-        id: "input.right",
-        place: Place::Input(0),
-        unit: "V",
-        equation: "V_r -> V_r + w(V_r)",
-        reads: &WHEEL_RIGHT,
-        side: 1,
-        doc: "between the commanded and the effective voltage of the right motor",
-    },
-    Channel {
-        id: "input.left",
-        place: Place::Input(1),
-        unit: "V",
-        equation: "V_l -> V_l + w(V_l)",
-        reads: &WHEEL_LEFT,
-        side: -1,
-        doc: "between the commanded and the effective voltage of the left motor",
-    },
-    Channel {
-        id: "sensor.linear_velocity",
-        place: Place::Output(0),
-        unit: "m/s",
-        equation: "v_measured = v + w",
-        reads: &BODY_FORWARD,
-        side: 0,
-        doc: "measurement of the forward speed",
-    },
-    Channel {
-        id: "sensor.angular_velocity",
-        place: Place::Output(1),
-        unit: "rad/s",
-        equation: "ω_measured = ω + w",
-        reads: &BODY_YAW,
-        side: 0,
-        doc: "measurement of the yaw rate",
-    },
-    Channel {
-        id: "sensor.track_speed_right",
-        place: Place::Output(10),
-        unit: "m/s",
-        equation: "v_r_measured = v_r + w",
-        reads: &WHEEL_RIGHT,
-        side: 1,
-        doc: "measurement of the right wheel's speed over ground",
-    },
-    Channel {
-        id: "sensor.track_speed_left",
-        place: Place::Output(11),
-        unit: "m/s",
-        equation: "v_l_measured = v_l + w",
-        reads: &WHEEL_LEFT,
-        side: -1,
-        doc: "measurement of the left wheel's speed over ground",
-    },
-];
-
-impl Plant<6, 2, 4, 8, 7> for Ddmr {
+impl Plant<6, 2, 4, 8, 11> for Ddmr {
     const META: PlantMeta = PlantMeta {
         id: "ddmr",
         summary: "differential-drive mobile robot with two DC motors",
@@ -479,6 +116,7 @@ impl Plant<6, 2, 4, 8, 7> for Ddmr {
         states: &STATES,
         inputs: &INPUTS,
         outputs: &OUTPUTS,
+        integrals: &INTEGRALS,
         channels: &CHANNELS,
         parameters: &LUMPED,
         parameterizations: &[Parameterization {
@@ -504,10 +142,15 @@ impl Plant<6, 2, 4, 8, 7> for Ddmr {
         ]
     }
 
-    fn outputs<S: Real>(x: &[S; 6], u: &[S; 2], p: &[S; 8]) -> [S; 7] {
+    fn outputs<S: Real>(x: &[S; 6], u: &[S; 2], p: &[S; 8]) -> [S; 11] {
         let [v, omega, heading, travel, _, _] = *x;
-        let [.., half_track, wheel_radius] = *p;
+        let [k_a, _, k_c, k_d, _, k_f, half_track, wheel_radius] = *p;
         let (right, left) = (v + half_track * omega, v - half_track * omega);
+        let half = S::of(0.5);
+        let forward = half * quotient(k_a, k_c) * v;
+        let turning = half * quotient(k_d, k_f) * omega;
+        let armature_right = u[0] + forward + turning;
+        let armature_left = u[1] + forward - turning;
         [
             right / wheel_radius,
             left / wheel_radius,
@@ -515,7 +158,11 @@ impl Plant<6, 2, 4, 8, 7> for Ddmr {
             left,
             (travel + half_track * heading) / wheel_radius,
             (travel - half_track * heading) / wheel_radius,
-            u[0].abs() + u[1].abs(),
+            armature_right.abs() + armature_left.abs(),
+            armature_right,
+            armature_left,
+            omega * omega,
+            -v * omega,
         ]
     }
 
@@ -541,6 +188,15 @@ impl Plant<6, 2, 4, 8, 7> for Ddmr {
     }
 }
 
+/// `a/b`, zero where `b` is: a motor without drive has no back-emf to speak of.
+fn quotient<S: Real>(a: S, b: S) -> S {
+    if b.abs() > S::of(1e-9) {
+        a / b
+    } else {
+        S::zero()
+    }
+}
+
 /// `u' = -f2(u) + G2 V`, (27)–(29): the drift is `-f2`, the input matrix `G2`.
 impl ControlAffine<2, 2, 8> for Ddmr {
     fn drift<S: Real>(y: &[S; 2], p: &[S; 8]) -> [S; 2] {
@@ -555,7 +211,7 @@ impl ControlAffine<2, 2, 8> for Ddmr {
     }
 }
 
-declare_plant!(Ddmr, "ddmr", <6, 2, 4, 8, 7>);
+declare_plant!(Ddmr, "ddmr", <6, 2, 4, 8, 11>);
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,176 @@
+//! Effects at their channels, ready to be evaluated.
+
+use crate::model::{Attached, Model};
+use crate::registry::HostReal;
+use crate::{Past, Place, Reading, Role};
+
+/// An effect at one channel.
+#[derive(Clone, Debug)]
+pub(super) struct Bound {
+    /// Index of the effect in the model.
+    pub(super) effect: usize,
+    pub(super) place: Place,
+    side: f64,
+    reads: [Option<usize>; Role::COUNT],
+    /// First of its states in the extended state vector.
+    pub(super) z: usize,
+    /// Number of its states.
+    pub(super) n_z: usize,
+    /// Index into the histories, for effects with memory.
+    pub(super) history: Option<usize>,
+}
+
+/// All effects of a model by the kind of place they act at, in the model's order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Bounds {
+    /// With memory, on inputs.
+    pub(super) input_memory: Vec<Bound>,
+    pub(super) inputs: Vec<Bound>,
+    pub(super) efforts: Vec<Bound>,
+    pub(super) bodies: Vec<Bound>,
+    pub(super) outputs: Vec<Bound>,
+    /// With memory, on outputs.
+    pub(super) output_memory: Vec<Bound>,
+    /// Number of histories.
+    pub(super) histories: usize,
+    /// Number of effect states.
+    pub(super) states: usize,
+}
+
+impl Bounds {
+    /// Binds the effects of `model`; their states follow the plant's.
+    pub(super) fn of(model: &Model) -> Self {
+        let mut bounds = Self::default();
+        let first = model.n_states();
+        for (index, effect) in model.effects.iter().enumerate() {
+            for (channel, reads) in effect.at.iter().zip(&effect.reads) {
+                let history = effect.meta.memory.then_some(bounds.histories);
+                bounds.histories += usize::from(effect.meta.memory);
+                let bound = Bound {
+                    effect: index,
+                    place: channel.place,
+                    side: f64::from(channel.side),
+                    reads: *reads,
+                    z: first + bounds.states,
+                    n_z: effect.meta.states,
+                    history,
+                };
+                bounds.states += effect.meta.states;
+                match (channel.place, effect.meta.memory) {
+                    (Place::Input(_), true) => bounds.input_memory.push(bound),
+                    (Place::Input(_), false) => bounds.inputs.push(bound),
+                    (Place::Output(_), true) => bounds.output_memory.push(bound),
+                    (Place::Output(_), false) => bounds.outputs.push(bound),
+                    (Place::Effort(_), _) => bounds.efforts.push(bound),
+                    (Place::Rate(_), _) => bounds.bodies.push(bound),
+                }
+            }
+        }
+        bounds
+    }
+
+    /// All of them.
+    pub(super) fn all(&self) -> impl Iterator<Item = &Bound> {
+        self.input_memory
+            .iter()
+            .chain(&self.inputs)
+            .chain(&self.efforts)
+            .chain(&self.bodies)
+            .chain(&self.outputs)
+            .chain(&self.output_memory)
+    }
+
+    /// Whether nothing acts within an integration step.
+    pub(super) fn idle(&self) -> bool {
+        self.inputs.is_empty()
+            && self.efforts.is_empty()
+            && self.bodies.is_empty()
+            && self.outputs.iter().all(|b| b.n_z == 0)
+    }
+
+    /// Whether an effect that acts within a step reads a signal beyond the first `states`.
+    pub(super) fn read_beyond(&self, states: usize) -> bool {
+        self.inputs
+            .iter()
+            .chain(&self.efforts)
+            .chain(&self.bodies)
+            .chain(&self.outputs)
+            .any(|b| {
+                b.reads.iter().flatten().any(|i| *i >= states)
+                    || matches!(b.place, Place::Output(i) if i >= states)
+            })
+    }
+}
+
+/// What an effect is evaluated with.
+pub(super) struct Scene<'a, S> {
+    pub(super) model: &'a Model,
+    /// Parameter values of the whole model.
+    pub(super) values: &'a [S],
+    /// Extended state.
+    pub(super) x: &'a [S],
+    pub(super) signals: &'a [S],
+    pub(super) time: f64,
+    /// Interval over which a contribution with memory holds.
+    pub(super) interval: (f64, f64),
+}
+
+impl<S: HostReal> Scene<'_, S> {
+    fn effect(&self, bound: &Bound) -> &Attached {
+        &self.model.effects[bound.effect]
+    }
+
+    fn reading<'p>(&self, bound: &Bound, nominal: S, past: &'p dyn Past<S>) -> Reading<'p, S> {
+        let mut roles = [S::zero(); Role::COUNT];
+        for (role, read) in roles.iter_mut().zip(&bound.reads) {
+            if let Some(index) = read {
+                *role = self.signals[*index];
+            }
+        }
+        Reading {
+            time: self.time,
+            from: self.interval.0,
+            to: self.interval.1,
+            nominal,
+            side: S::of(bound.side),
+            roles,
+            past,
+        }
+    }
+
+    fn parameters(&self, bound: &Bound) -> &[S] {
+        let effect = self.effect(bound);
+        let first = effect.first_parameter;
+        &self.values[first..first + effect.meta.parameters.len()]
+    }
+
+    /// What the effect adds to its channel.
+    pub(super) fn contribution(&self, bound: &Bound, nominal: S, past: &dyn Past<S>) -> S {
+        S::physics(self.effect(bound).physics).contribution(
+            &self.reading(bound, nominal, past),
+            &self.x[bound.z..bound.z + bound.n_z],
+            self.parameters(bound),
+        )
+    }
+
+    /// The rates of its states.
+    pub(super) fn rates(&self, bound: &Bound, nominal: S, past: &dyn Past<S>, dx: &mut [S]) {
+        if bound.n_z > 0 {
+            S::physics(self.effect(bound).physics).state_derivative(
+                &self.reading(bound, nominal, past),
+                &self.x[bound.z..bound.z + bound.n_z],
+                self.parameters(bound),
+                &mut dx[bound.z..bound.z + bound.n_z],
+            );
+        }
+    }
+
+    /// Its states at the start of a run, into `z`.
+    pub(super) fn initial(&self, bound: &Bound, nominal: S, past: &dyn Past<S>, z: &mut [S]) {
+        S::physics(self.effect(bound).physics).initial_state(
+            &self.reading(bound, nominal, past),
+            self.parameters(bound),
+            z,
+        );
+    }
+}

@@ -1,0 +1,471 @@
+//! A composed model in motion: the free run that everything is judged by.
+
+mod bound;
+mod history;
+mod sensing;
+
+use std::borrow::Cow;
+
+use crate::model::Model;
+use crate::registry::HostReal;
+use crate::run::Run;
+use crate::{NoPast, Place, Rk4, substeps};
+
+use bound::{Bounds, Scene};
+use history::{Between, History};
+use sensing::{Integral, Sensing, sense};
+
+/// Integrates a model through time.
+///
+/// The extended state is the plant's, then the effects' states, then running integrals of those
+/// measured signals whose mean or past is needed and whose integral the plant does not know.
+///
+/// Order of evaluation at each stage: effects on inputs, the plant's outputs, efforts, the plant,
+/// effects on the rates of its states. Effects with memory on inputs come first, once per
+/// integration step; effects on sensors act on what is measured.
+#[derive(Clone)]
+pub struct Simulator<'m, S> {
+    model: Cow<'m, Model>,
+    p: Vec<S>,
+    values: Vec<S>,
+    bounds: Bounds,
+    sensors: Vec<Sensing>,
+    histories: Vec<History<S>>,
+    rk4: Rk4<Vec<S>>,
+    x: Vec<S>,
+    scratch: Scratch<S>,
+    /// Integrals behind means at the start of the last interval, one per sensor.
+    before: Vec<S>,
+    /// What output effects added to angles then, one per output effect.
+    added_before: Vec<S>,
+    needs_signals: bool,
+    time: f64,
+    interval: f64,
+}
+
+#[derive(Clone)]
+struct Scratch<S> {
+    /// Inputs after the effects with memory.
+    held: Vec<S>,
+    /// Inputs after all effects.
+    u: Vec<S>,
+    w: Vec<S>,
+    signals: Vec<S>,
+}
+
+impl<S: HostReal> Simulator<'static, S> {
+    /// As [`Simulator::new`], keeping the model: for a driver, which outlives who builds it.
+    pub fn owning(model: Model, values: &[S]) -> Self {
+        Self::compose(Cow::Owned(model), values)
+    }
+}
+
+impl<'m, S: HostReal> Simulator<'m, S> {
+    /// A simulator of `model` with the parameter `values` (as long as `model.parameters`), at rest.
+    pub fn new(model: &'m Model, values: &[S]) -> Self {
+        Self::compose(Cow::Borrowed(model), values)
+    }
+
+    fn compose(model: Cow<'m, Model>, values: &[S]) -> Self {
+        let nx = model.n_states();
+        let nu = model.plant.inputs.len();
+        let bounds = Bounds::of(&model);
+        let mut size = nx + bounds.states;
+        let sensors: Vec<Sensing> = model
+            .measured
+            .iter()
+            .map(|m| {
+                let sensing = sense(&model, &bounds, m.index, &m.sensor, size);
+                size += usize::from(matches!(sensing.integral, Integral::State(_)));
+                sensing
+            })
+            .collect();
+        let quadrature_beyond = sensors
+            .iter()
+            .any(|s| matches!(s.integral, Integral::State(_)) && s.index >= nx);
+        // Not cloned from one: a clone of an empty history has no room kept for what is to come.
+        let histories = (0..bounds.histories)
+            .map(|i| {
+                let smooth = bounds.output_memory.iter().any(|b| b.history == Some(i));
+                History::new(if smooth {
+                    Between::Smooth
+                } else {
+                    Between::Held
+                })
+            })
+            .collect();
+        let mut simulator = Self {
+            p: model.lower(values),
+            values: values.to_vec(),
+            histories,
+            rk4: Rk4::new(vec![S::zero(); size]),
+            x: vec![S::zero(); size],
+            scratch: Scratch {
+                held: vec![S::zero(); nu],
+                u: vec![S::zero(); nu],
+                w: vec![S::zero(); model.n_efforts()],
+                signals: vec![S::zero(); model.n_signals()],
+            },
+            before: vec![S::zero(); sensors.len()],
+            added_before: vec![S::zero(); bounds.outputs.len()],
+            needs_signals: bounds.read_beyond(nx) || quadrature_beyond,
+            sensors,
+            bounds,
+            time: 0.0,
+            interval: 0.0,
+            model,
+        };
+        simulator.reset(&vec![S::zero(); nx], &vec![0.0; nu]);
+        simulator
+    }
+
+    /// Starts a run at time 0 from the plant state `x0`, as if `input` had been applied for ever.
+    pub fn reset(&mut self, x0: &[S], input: &[f64]) {
+        let nx = self.model.n_states();
+        self.time = 0.0;
+        self.interval = 0.0;
+        for (to, from) in self.x.iter_mut().zip(x0) {
+            *to = *from;
+        }
+        self.x[nx..].fill(S::zero());
+        for (to, from) in self.scratch.held.iter_mut().zip(input) {
+            *to = S::of(*from);
+        }
+        for bound in &self.bounds.input_memory {
+            if let (Some(history), Place::Input(i)) = (bound.history, bound.place) {
+                self.histories[history].clear();
+                self.histories[history].hold(0.0, S::of(input[i]));
+            }
+        }
+        self.refresh();
+        if self.bounds.states > 0 {
+            let mut z = vec![S::zero(); self.bounds.states];
+            let scene = self.scene();
+            for bound in self.bounds.all().filter(|b| b.n_z > 0) {
+                let nominal = match bound.place {
+                    Place::Input(i) => self.scratch.held[i],
+                    Place::Output(i) => self.scratch.signals[i],
+                    Place::Effort(_) | Place::Rate(_) => S::zero(),
+                };
+                scene.initial(bound, nominal, &NoPast, &mut z[bound.z - nx..][..bound.n_z]);
+            }
+            self.x[nx..nx + z.len()].copy_from_slice(&z);
+        }
+        for bound in &self.bounds.output_memory {
+            if let Some(history) = bound.history {
+                self.histories[history].clear();
+            }
+        }
+        self.remember();
+        self.mark();
+    }
+
+    /// Time since the start of the run, s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// The plant state.
+    pub fn state(&self) -> &[S] {
+        &self.x[..self.model.n_states()]
+    }
+
+    /// The plant state, to be corrected.
+    pub fn state_mut(&mut self) -> &mut [S] {
+        let nx = self.model.n_states();
+        &mut self.x[..nx]
+    }
+
+    /// All signals of the plant (states, inputs, outputs) now.
+    pub fn signals(&mut self) -> &[S] {
+        self.refresh();
+        &self.scratch.signals
+    }
+
+    fn refresh(&mut self) {
+        let nx = self.model.n_states();
+        let Scratch { held, signals, .. } = &mut self.scratch;
+        self.model.signals_at(&self.p, &self.x[..nx], held, signals);
+    }
+
+    fn scene(&self) -> Scene<'_, S> {
+        Scene {
+            model: &self.model,
+            values: &self.values,
+            x: &self.x,
+            signals: &self.scratch.signals,
+            time: self.time,
+            interval: (self.time - self.interval, self.time),
+        }
+    }
+
+    /// The integral behind the mean of a sensor; signals must be fresh.
+    fn integral(&self, sensor: &Sensing) -> S {
+        match sensor.integral {
+            Integral::None => S::zero(),
+            Integral::Signal(i) => self.scratch.signals[i],
+            Integral::State(i) => self.x[i],
+        }
+    }
+
+    /// Keeps the integrals with which the next interval begins; signals must be fresh.
+    fn mark(&mut self) {
+        for i in 0..self.sensors.len() {
+            self.before[i] = self.integral(&self.sensors[i]);
+        }
+        if self.sensors.iter().any(|s| !s.through.is_empty()) {
+            for i in 0..self.bounds.outputs.len() {
+                self.added_before[i] = self.added(i);
+            }
+        }
+    }
+
+    /// What the `i`-th output effect adds to its signal now.
+    fn added(&self, i: usize) -> S {
+        let bound = &self.bounds.outputs[i];
+        let Place::Output(index) = bound.place else {
+            return S::zero();
+        };
+        self.scene()
+            .contribution(bound, self.scratch.signals[index], &NoPast)
+    }
+
+    /// Writes the present into the past of sensors with memory; signals must be fresh.
+    fn remember(&mut self) {
+        for k in 0..self.bounds.output_memory.len() {
+            let bound = &self.bounds.output_memory[k];
+            let (Some(history), Place::Output(index)) = (bound.history, bound.place) else {
+                continue;
+            };
+            let Some(sensor) = self.sensors.iter().find(|s| s.index == index) else {
+                continue;
+            };
+            let value = self.scratch.signals[index] + self.output_effects(index);
+            let integral = self.integral(sensor);
+            self.histories[history].pass(self.time, value, integral);
+        }
+    }
+
+    /// The sum of what the effects without memory add to an output now.
+    fn output_effects(&self, index: usize) -> S {
+        let scene = self.scene();
+        let mut value = self.scratch.signals[index];
+        for bound in self
+            .bounds
+            .outputs
+            .iter()
+            .filter(|b| b.place == Place::Output(index))
+        {
+            value += scene.contribution(bound, value, &NoPast);
+        }
+        value - self.scratch.signals[index]
+    }
+
+    /// Integrates to `until` (s since the start of the run) with `input` applied from now on.
+    pub fn advance(&mut self, until: f64, input: &[f64]) {
+        if !self.sensors.is_empty() {
+            self.refresh();
+            self.mark();
+        }
+        for bound in &self.bounds.input_memory {
+            if let (Some(history), Place::Input(i)) = (bound.history, bound.place) {
+                self.histories[history].hold(self.time, S::of(input[i]));
+            }
+        }
+        let span = until - self.time;
+        let start = self.time;
+        let steps = substeps(span, self.model.max_step);
+        let h = span / steps as f64;
+        for step in 0..steps {
+            self.step(start + h * step as f64, h, input);
+            if !self.bounds.output_memory.is_empty() {
+                self.time = start + h * (step + 1) as f64;
+                self.refresh();
+                self.remember();
+            }
+        }
+        self.time = until;
+        self.interval = span;
+    }
+
+    /// One integration step.
+    fn step(&mut self, from: f64, h: f64, input: &[f64]) {
+        for (held, value) in self.scratch.held.iter_mut().zip(input) {
+            *held = S::of(*value);
+        }
+        let Self {
+            model,
+            p,
+            values,
+            bounds,
+            sensors,
+            histories,
+            rk4,
+            x,
+            scratch,
+            needs_signals,
+            ..
+        } = self;
+        let model: &Model = model;
+        for bound in &bounds.input_memory {
+            let (Some(history), Place::Input(i)) = (bound.history, bound.place) else {
+                continue;
+            };
+            let interval = (from, from + h);
+            let scene = Scene {
+                model,
+                values,
+                x,
+                signals: &scratch.signals,
+                time: from,
+                interval,
+            };
+            let nominal = scratch.held[i];
+            scratch.held[i] += scene.contribution(bound, nominal, &histories[history]);
+        }
+        let nx = model.n_states();
+        let dynamics = S::dynamics(model.dynamics);
+        if bounds.idle() && x.len() == nx {
+            // Nothing acts on the plant within the step (`w` stays zero): half the time.
+            dynamics.step(x, S::of(h), &scratch.held, &scratch.w, p);
+            return;
+        }
+        let Scratch {
+            held,
+            u,
+            w,
+            signals,
+        } = scratch;
+        rk4.step(x, S::of(h), |stage, x, dx| {
+            let time = from + h * [0.0, 0.5, 0.5, 1.0][stage];
+            let interval = (time, time);
+            let plant_x = &x[..nx];
+            u.copy_from_slice(held);
+            if bounds.inputs.is_empty() {
+                signals[..nx].copy_from_slice(plant_x);
+            } else {
+                model.signals_at(p, plant_x, u, signals);
+                let scene = Scene {
+                    model,
+                    values,
+                    x,
+                    signals,
+                    time,
+                    interval,
+                };
+                for bound in &bounds.inputs {
+                    let Place::Input(i) = bound.place else {
+                        continue;
+                    };
+                    scene.rates(bound, u[i], &NoPast, dx);
+                    let add = scene.contribution(bound, u[i], &NoPast);
+                    u[i] += add;
+                }
+            }
+            if *needs_signals {
+                model.signals_at(p, plant_x, u, signals);
+            }
+            let scene = Scene {
+                model,
+                values,
+                x,
+                signals,
+                time,
+                interval,
+            };
+            if !bounds.efforts.is_empty() {
+                w.fill(S::zero());
+                for bound in &bounds.efforts {
+                    let Place::Effort(i) = bound.place else {
+                        continue;
+                    };
+                    scene.rates(bound, w[i], &NoPast, dx);
+                    let add = scene.contribution(bound, w[i], &NoPast);
+                    w[i] += add;
+                }
+            }
+            dynamics.derivative(plant_x, u, w, p, &mut dx[..nx]);
+            for bound in &bounds.bodies {
+                let Place::Rate(i) = bound.place else {
+                    continue;
+                };
+                let nominal = dx[i];
+                scene.rates(bound, nominal, &NoPast, dx);
+                dx[i] += scene.contribution(bound, nominal, &NoPast);
+            }
+            for bound in bounds.outputs.iter().filter(|b| b.n_z > 0) {
+                let Place::Output(i) = bound.place else {
+                    continue;
+                };
+                scene.rates(bound, signals[i], &NoPast, dx);
+            }
+            for sensor in sensors.iter() {
+                let Integral::State(to) = sensor.integral else {
+                    continue;
+                };
+                let mut value = signals[sensor.index];
+                for bound in &bounds.outputs {
+                    if bound.place == Place::Output(sensor.index) {
+                        value += scene.contribution(bound, value, &NoPast);
+                    }
+                }
+                dx[to] = value;
+            }
+        });
+    }
+
+    /// What the sensors read now. A mean is taken over the last [`Simulator::advance`]; at the
+    /// start of a run it is the value itself.
+    pub fn measure(&mut self, measured: &mut [S]) {
+        self.refresh();
+        for (i, (to, sensor)) in measured.iter_mut().zip(&self.sensors).enumerate() {
+            let mean = sensor.is_mean && self.interval > 0.0;
+            *to = if mean {
+                (self.integral(sensor) - self.before[i]) / S::of(self.interval)
+            } else {
+                self.scratch.signals[sensor.index] + self.output_effects(sensor.index)
+            };
+            if mean {
+                for (effect, gain) in &sensor.through {
+                    let change = self.added(*effect) - self.added_before[*effect];
+                    *to += change * S::of(gain / self.interval);
+                }
+            }
+            let mut scene = self.scene();
+            if !mean {
+                scene.interval = (self.time, self.time);
+            }
+            for bound in &self.bounds.output_memory {
+                if let (Some(history), true) =
+                    (bound.history, bound.place == Place::Output(sensor.index))
+                {
+                    *to += scene.contribution(bound, *to, &self.histories[history]);
+                }
+            }
+        }
+    }
+}
+
+/// The model simulated over a run from the inputs alone, from the plant state `x0`.
+///
+/// `each` gets the index of the sample and what the sensors would have read. The first sample is
+/// the initial state itself.
+pub fn free_run<S: HostReal>(
+    simulator: &mut Simulator<'_, S>,
+    x0: &[S],
+    run: &Run,
+    mut each: impl FnMut(usize, &[S]),
+) {
+    let Some(&start) = run.time.first() else {
+        return;
+    };
+    let mut predicted = vec![S::zero(); simulator.model.measured.len()];
+    simulator.reset(x0, run.input(0));
+    simulator.measure(&mut predicted);
+    each(0, &predicted);
+    for k in 1..run.len() {
+        simulator.advance(run.time[k] - start, run.input(k - 1));
+        simulator.measure(&mut predicted);
+        each(k, &predicted);
+    }
+}

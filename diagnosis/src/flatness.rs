@@ -1,0 +1,110 @@
+//! What the data do not determine.
+
+use nalgebra::{DMatrix, DVector};
+
+/// A parameter among the unknowns of a fit.
+pub(crate) struct Named<'a> {
+    pub(crate) name: &'a str,
+    /// Scale of its declaration.
+    pub(crate) declared: f64,
+    /// Parameter = unknown × scale.
+    pub(crate) scale: f64,
+}
+
+/// Directions in which the data say nothing.
+pub(crate) struct Flatness {
+    /// Unknowns without influence.
+    pub(crate) dead: Vec<bool>,
+    /// Unknowns of which only a combination is determined.
+    pub(crate) flat: Vec<bool>,
+    /// The combinations, in words.
+    pub(crate) words: Vec<String>,
+    vectors: DMatrix<f64>,
+    values: DVector<f64>,
+}
+
+/// A singular value of the column-normalised Jacobian below this: the direction is flat.
+const FLAT: f64 = 1e-6;
+/// A change of a parameter by its scale that moves the weighted outputs by less than this is dead.
+pub(crate) const DEAD: f64 = 1e-9;
+
+impl Flatness {
+    /// Finds them from `JᵀJ` and its columns' norms; the first unknowns are the `named` ones.
+    pub(crate) fn of(gram: &DMatrix<f64>, norms: &[f64], named: &[Named<'_>]) -> Self {
+        let n = norms.len();
+        // The unknowns are balanced: a dead one is dead on the scale of its declaration.
+        let dead: Vec<bool> = norms
+            .iter()
+            .enumerate()
+            .map(|(i, norm)| {
+                let natural = named.get(i).map_or(1.0, |p| p.declared / p.scale);
+                *norm * natural <= DEAD || !norm.is_finite()
+            })
+            .collect();
+        let mut normalised = gram.clone();
+        for i in 0..n {
+            for j in 0..n {
+                normalised[(i, j)] = if dead[i] || dead[j] {
+                    f64::from(u8::from(i == j))
+                } else {
+                    gram[(i, j)] / (norms[i] * norms[j])
+                };
+            }
+        }
+        let eigen = normalised.symmetric_eigen();
+        let mut flat = vec![false; n];
+        let mut words = Vec::new();
+        for (k, value) in eigen.eigenvalues.iter().enumerate() {
+            // Eigenvalues are squares of singular values.
+            if *value > FLAT * FLAT {
+                continue;
+            }
+            let mut terms = Vec::new();
+            for (i, parameter) in named.iter().enumerate() {
+                let share = eigen.eigenvectors[(i, k)];
+                if share.abs() > 0.1 {
+                    flat[i] = true;
+                    let change = share / norms[i] * parameter.scale;
+                    terms.push((parameter.name, change));
+                }
+            }
+            let largest = terms.iter().fold(0.0f64, |a, (_, c)| a.max(c.abs()));
+            let text: Vec<String> = terms
+                .iter()
+                .map(|(name, change)| format!("{:+.3} {name}", change / largest))
+                .collect();
+            if !text.is_empty() {
+                words.push(format!("moving along {} changes nothing", text.join(" ")));
+            }
+        }
+        Self {
+            dead,
+            flat,
+            words,
+            vectors: eigen.eigenvectors,
+            values: eigen.eigenvalues,
+        }
+    }
+
+    /// `(JᵀJ)⁻¹` without the flat directions.
+    pub(crate) fn inverse(&self, norms: &[f64]) -> DMatrix<f64> {
+        let n = norms.len();
+        let mut inverse = DMatrix::zeros(n, n);
+        for (k, value) in self.values.iter().enumerate() {
+            if *value > FLAT * FLAT {
+                let v = self.vectors.column(k);
+                inverse += v * v.transpose() / *value;
+            }
+        }
+        for i in 0..n {
+            for j in 0..n {
+                inverse[(i, j)] = if self.dead[i] || self.dead[j] {
+                    0.0
+                } else {
+                    inverse[(i, j)] / (norms[i] * norms[j])
+                };
+            }
+        }
+        inverse
+    }
+}
