@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::config::{ConfigError, Source, Step, nearest};
-use crate::model::{Attached, ModelParameter, signal_index};
-use crate::registry::EffectPart;
+use crate::model::{Attached, Model, ModelParameter, signal_index};
+use crate::registry::{AnyPhysics, EffectPart};
 use crate::{Channel, EffectMeta, PlantMeta, Role};
 
 /// Binds the effect `part`, the `index`-th of the file, to its channels and adds its parameters.
@@ -31,7 +31,6 @@ pub(crate) fn attach(
         ));
     }
     let mut at = Vec::new();
-    let mut reads = Vec::new();
     for (i, id) in part.at().iter().enumerate() {
         let channel = plant
             .channels
@@ -57,15 +56,42 @@ pub(crate) fn attach(
                 Some(format!("channels where it fits: {}", fitting.join(", "))),
             ));
         }
-        let mut bound = [None; Role::COUNT];
-        for role in meta.reads {
-            bound[*role as usize] = channel.read(*role).and_then(|s| signal_index(plant, s));
-        }
         at.push(channel);
-        reads.push(bound);
     }
+    let given = &part.values().given;
+    Ok(bind(
+        plant,
+        meta,
+        part.physics(),
+        at,
+        given,
+        &base,
+        parameters,
+    ))
+}
+
+/// Binds an effect to channels that it fits.
+fn bind(
+    plant: &'static PlantMeta,
+    meta: &'static EffectMeta,
+    physics: &'static dyn AnyPhysics,
+    at: Vec<&'static Channel>,
+    given: &[Option<f64>],
+    base: &[Step],
+    parameters: &mut Vec<ModelParameter>,
+) -> Attached {
+    let reads = at
+        .iter()
+        .map(|channel| {
+            let mut bound = [None; Role::COUNT];
+            for role in meta.reads {
+                bound[*role as usize] = channel.read(*role).and_then(|s| signal_index(plant, s));
+            }
+            bound
+        })
+        .collect();
     let first_parameter = parameters.len();
-    for (declaration, given) in meta.parameters.iter().zip(&part.values().given) {
+    for (declaration, given) in meta.parameters.iter().zip(given) {
         parameters.push(ModelParameter {
             name: format!("{}.{}", meta.id, declaration.id),
             declaration,
@@ -74,16 +100,51 @@ pub(crate) fn attach(
                 .replace("channel", at.first().map_or("1", |c| c.unit)),
             value: given.or(declaration.default),
             free: declaration.estimated,
-            path: path(&[declaration.id.into()]),
+            path: base
+                .iter()
+                .cloned()
+                .chain([declaration.id.into()])
+                .collect(),
         });
     }
-    Ok(Attached {
+    Attached {
         meta,
         at,
         first_parameter,
-        physics: part.physics(),
+        physics,
         reads,
-    })
+    }
+}
+
+impl Model {
+    /// The model with the effect `id` added at the channels `at`, with the effect's default
+    /// parameters. `None` when there is no such effect or it does not fit one of the channels.
+    pub fn with_effect(&self, id: &str, at: &[&str]) -> Option<Model> {
+        let (meta, physics) = crate::registry::effect(id)?;
+        let channels: Option<Vec<&'static Channel>> = at
+            .iter()
+            .map(|name| self.plant.channels.iter().find(|c| c.id == *name))
+            .collect();
+        let channels = channels?;
+        if channels.is_empty() || channels.iter().any(|c| misfit(c, meta).is_some()) {
+            return None;
+        }
+        let mut model = self.clone();
+        let base: [Step; 3] = ["effect".into(), model.effects.len().into(), meta.id.into()];
+        let given = vec![None; meta.parameters.len()];
+        let attached = bind(
+            self.plant,
+            meta,
+            physics,
+            channels,
+            &given,
+            &base,
+            &mut model.parameters,
+        );
+        model.effects.push(attached);
+        make_names_unique(&mut model.parameters, &model.effects);
+        Some(model)
+    }
 }
 
 /// Why an effect cannot act on a channel; `None` when it can.
@@ -119,27 +180,25 @@ fn fitting_channels(plant: &PlantMeta, effect: &EffectMeta) -> Vec<&'static str>
 }
 
 /// Two instances of one effect are told apart by their channels.
-pub(crate) fn make_names_unique(
-    parameters: &mut [ModelParameter],
-    effects: &[Attached],
-    first: usize,
-) {
-    let mut count: BTreeMap<String, usize> = BTreeMap::new();
-    for parameter in &parameters[first..] {
-        *count.entry(parameter.name.clone()).or_default() += 1;
+pub(crate) fn make_names_unique(parameters: &mut [ModelParameter], effects: &[Attached]) {
+    let mut count: BTreeMap<&str, usize> = BTreeMap::new();
+    for effect in effects {
+        *count.entry(effect.meta.id).or_default() += 1;
     }
     for effect in effects {
+        let channels: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
+        let alone = count.get(effect.meta.id) == Some(&1);
         for (i, declaration) in effect.meta.parameters.iter().enumerate() {
-            let parameter = &mut parameters[effect.first_parameter + i];
-            if count.get(&parameter.name).copied().unwrap_or(0) > 1 {
-                let channels: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
-                parameter.name = format!(
+            parameters[effect.first_parameter + i].name = if alone {
+                format!("{}.{}", effect.meta.id, declaration.id)
+            } else {
+                format!(
                     "{}@{}.{}",
                     effect.meta.id,
                     channels.join("+"),
                     declaration.id
-                );
-            }
+                )
+            };
         }
     }
 }

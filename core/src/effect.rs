@@ -26,6 +26,10 @@ pub struct EffectMeta {
     /// Its parameters, shared by all the channels of one instance. A parameter with unit
     /// `channel` has the unit of the channel; `channel/x` that unit divided by `x`.
     pub parameters: &'static [Parameter],
+    /// Acts on all its channels together, as one instance: one supply, one body.
+    pub shared_only: bool,
+    /// Ids of effects that it contains as special cases: it has to earn its further parameters.
+    pub simpler: &'static [&'static str],
     /// States per channel it is attached to.
     pub states: usize,
     /// It looks back in time at its channel, through [`Reading::past`]. Such effects are evaluated
@@ -224,7 +228,8 @@ macro_rules! register_effect {
             }
 
             inventory::submit! { $crate::registry::EffectEntry(
-                <$effect as $crate::registry::DeclaredEffect>::META
+                <$effect as $crate::registry::DeclaredEffect>::META,
+                <$effect as $crate::registry::DeclaredEffect>::INSTANCE,
             ) }
         };
     };

@@ -228,7 +228,7 @@ impl Model {
             let attached = attach(plant, part.as_ref(), index, &mut parameters, source)?;
             effects.push(attached);
         }
-        make_names_unique(&mut parameters, &effects, n_plant_parameters);
+        make_names_unique(&mut parameters, &effects);
 
         let step = file.simulation.max_step_s;
         if !(step > 0.0 && step.is_finite()) {

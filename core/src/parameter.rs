@@ -36,6 +36,8 @@ pub struct Parameter {
     pub linear: bool,
     /// Size of a noticeable change, in the parameter's unit: scales a fit when the value is zero.
     pub scale: f64,
+    /// Values a fit should start from where its surface has several minima; empty: one start.
+    pub starts: &'static [f64],
 }
 
 impl Parameter {
@@ -58,6 +60,7 @@ impl Parameter {
             estimated: true,
             linear: true,
             scale: 1.0,
+            starts: &[],
         }
     }
 
@@ -104,6 +107,12 @@ impl Parameter {
     /// Size of a noticeable change, in the parameter's unit.
     pub const fn scaled(mut self, scale: f64) -> Self {
         self.scale = scale;
+        self
+    }
+
+    /// Values a fit should start from where its surface has several minima.
+    pub const fn starting_at(mut self, starts: &'static [f64]) -> Self {
+        self.starts = starts;
         self
     }
 

@@ -231,8 +231,7 @@ pub trait DriverPart: Debug + Send + Sync {
 #[derive(Debug)]
 pub struct PlantEntry(pub &'static PlantMeta);
 /// Registers an effect; made by [`declare_effect!`](crate::declare_effect).
-#[derive(Debug)]
-pub struct EffectEntry(pub &'static EffectMeta);
+pub struct EffectEntry(pub &'static EffectMeta, pub &'static dyn AnyPhysics);
 /// Registers an estimator, controller or driver; made by
 /// [`declare_part!`](crate::declare_part).
 #[derive(Debug)]
@@ -271,6 +270,14 @@ pub fn effects() -> Vec<&'static EffectMeta> {
         .collect();
     all.sort_by_key(|m| m.id);
     all
+}
+
+/// The equations of the effect `id`, with its declaration.
+pub(crate) fn effect(id: &str) -> Option<(&'static EffectMeta, &'static dyn AnyPhysics)> {
+    inventory::iter::<EffectEntry>
+        .into_iter()
+        .find(|e| e.0.id == id)
+        .map(|e| (e.0, e.1))
 }
 
 /// All linked estimators, controllers and drivers, by role and id.

@@ -7,6 +7,7 @@ mod flatness;
 mod noise;
 mod output_error;
 mod prediction;
+mod problem;
 mod regression;
 mod rls;
 mod score;

@@ -54,6 +54,8 @@ impl Effect<2, 0> for CoulombFriction {
             .nonlinear()
             .scaled(0.1),
         ],
+        shared_only: false,
+        simpler: &[],
         states: 0,
         memory: false,
     };

@@ -39,6 +39,8 @@ impl Effect<1, 0> for InputDelay {
                 .nonlinear()
                 .scaled(0.01),
         ],
+        shared_only: false,
+        simpler: &[],
         states: 0,
         memory: true,
     };

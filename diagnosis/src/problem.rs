@@ -1,0 +1,540 @@
+//! The least-squares problem of a fit to the free run, and its solution.
+
+use std::cell::{Cell, RefCell};
+use std::convert::Infallible;
+
+use basin::{
+    BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet, Constraints,
+    Executor, Jacobian, Residual,
+};
+use loopsight_core::model::Model;
+use loopsight_core::run::Run;
+use nalgebra::{DMatrix, DVector};
+
+use crate::fit::{FitError, FitSettings};
+use crate::flatness::{DEAD, Named};
+use crate::noise::{self, Block};
+use crate::prediction::{InitialStates, predict, residuals, sensitivities, visible_states};
+use crate::regression::batch;
+use crate::score::Tally;
+
+/// A residual whose noise model has `c` below this and `a` within ±[`SLOW`] is rounded counts.
+const ROUNDED: f64 = -0.8;
+/// See [`ROUNDED`].
+const SLOW: f64 = 0.3;
+/// Spans of the regressions that a fit may start from, s.
+const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
+
+/// Unknowns, weighted residuals there, and their Jacobian.
+type Linearised = (DVector<f64>, DVector<f64>, DMatrix<f64>);
+
+pub(crate) struct Problem<'a> {
+    pub(crate) model: &'a Model,
+    runs: &'a [Run],
+    progress: &'a (dyn Fn(u64, f64) + Sync),
+    /// Indices of the estimated parameters.
+    pub(crate) free: Vec<usize>,
+    /// Plant states whose initial values are estimated.
+    visible: Vec<usize>,
+    /// One over the standard deviation of each signal, over the root of the number of samples.
+    weights: Vec<f64>,
+    /// Unknown = scaled unknown × scale.
+    pub(crate) scales: Vec<f64>,
+    lower: DVector<f64>,
+    upper: DVector<f64>,
+    /// Moving-average coefficient by signal; empty in the first pass.
+    rounding: Vec<f64>,
+    pub(crate) evaluations: Cell<u64>,
+    cache: RefCell<Option<Linearised>>,
+    pub(crate) samples: f64,
+    /// Samples that the fit may see, by run; all where there is none.
+    seen: Option<&'a [Vec<bool>]>,
+    /// Initial states that are not estimated, by run.
+    held: Option<Vec<DVector<f64>>>,
+}
+
+/// How hard a fit tries.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
+    /// Most iterations.
+    pub(crate) iterations: u64,
+    /// Relative change of the cost at which it is done.
+    pub(crate) tolerance: f64,
+}
+
+impl Effort {
+    /// To far below the standard errors.
+    pub(crate) const FULL: Self = Self {
+        iterations: 100,
+        tolerance: 1e-9,
+    };
+}
+
+/// What a fit found.
+#[derive(Clone, Debug)]
+pub(crate) struct Solution {
+    /// Parameter values of the model.
+    pub(crate) values: Vec<f64>,
+    /// Initial states by run.
+    pub(crate) states: Vec<DVector<f64>>,
+    /// Weighted sum of squares: the mean of the signals' squared `nrmse` on what the fit saw.
+    pub(crate) cost: f64,
+}
+
+impl<'a> Problem<'a> {
+    pub(crate) fn new(
+        model: &'a Model,
+        runs: &'a [Run],
+        progress: &'a (dyn Fn(u64, f64) + Sync),
+    ) -> Result<Self, FitError> {
+        Self::with(model, runs, None, None, progress)
+    }
+
+    /// As [`Problem::new`]; of each run only the samples that are `seen`, with initial states that
+    /// are `held` instead of estimated.
+    pub(crate) fn with(
+        model: &'a Model,
+        runs: &'a [Run],
+        seen: Option<&'a [Vec<bool>]>,
+        held: Option<Vec<DVector<f64>>>,
+        progress: &'a (dyn Fn(u64, f64) + Sync),
+    ) -> Result<Self, FitError> {
+        let free: Vec<usize> = (0..model.parameters.len())
+            .filter(|i| model.parameters[*i].free)
+            .collect();
+        let mut tallies = vec![Tally::default(); model.measured.len()];
+        let mut samples = 0.0;
+        for (index, run) in runs.iter().enumerate() {
+            for k in 0..run.len() {
+                let counts = seen.is_none_or(|s| s[index][k]);
+                for (tally, y) in tallies.iter_mut().zip(run.sample(k)) {
+                    tally.add(*y, *y);
+                    samples += f64::from(u8::from(y.is_finite() && counts));
+                }
+            }
+        }
+        let weights: Vec<f64> = tallies
+            .iter()
+            .map(|t| {
+                let std = t.std();
+                // A signal that never moves tells nothing.
+                if std > 0.0 {
+                    1.0 / (std * f64::sqrt(samples))
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let visible = match held {
+            Some(_) => Vec::new(),
+            None => visible_states(model, &nominal(model)),
+        };
+        let mut scales = Vec::new();
+        let mut lower = Vec::new();
+        let mut upper = Vec::new();
+        for &i in &free {
+            let declaration = model.parameters[i].declaration;
+            let scale = declaration
+                .scale
+                .max(model.parameters[i].value.map_or(0.0, f64::abs));
+            let (low, high) = declaration.bounds();
+            scales.push(scale);
+            lower.push(low / scale);
+            upper.push(high / scale);
+        }
+        for _ in runs {
+            for _ in &visible {
+                scales.push(1.0);
+                lower.push(f64::NEG_INFINITY);
+                upper.push(f64::INFINITY);
+            }
+        }
+        Ok(Self {
+            model,
+            runs,
+            progress,
+            free,
+            visible,
+            weights,
+            scales,
+            lower: DVector::from_vec(lower),
+            upper: DVector::from_vec(upper),
+            rounding: Vec::new(),
+            evaluations: Cell::new(0),
+            cache: RefCell::new(None),
+            samples,
+            seen,
+            held,
+        })
+    }
+
+    /// The file's values, and those of regressions; whichever runs closest to the data.
+    pub(crate) fn start(&self, settings: &FitSettings) -> Result<DVector<f64>, FitError> {
+        let mut candidates = Vec::new();
+        if self.model.missing_values().is_empty() {
+            candidates.push(self.model.values());
+        }
+        let mut failure = None;
+        for span in SPANS {
+            match batch(self.model, self.runs, settings.scheme, span) {
+                Ok(values) => candidates.push(values),
+                Err(error) => failure = Some(error),
+            }
+        }
+        if let (true, Some(error)) = (candidates.is_empty(), failure) {
+            return Err(error);
+        }
+        let mut best: Option<(f64, DVector<f64>)> = None;
+        for values in candidates {
+            let initial = match &self.held {
+                Some(states) => states.clone(),
+                None => InitialStates::guess(self.model, &values, self.runs).states,
+            };
+            let scaled = self.pack(&values, &initial);
+            let cost = self.residual_vector(&scaled).norm_squared();
+            if cost.is_finite() && best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, scaled));
+            }
+        }
+        best.map(|(_, start)| start).ok_or_else(|| {
+            FitError::Solver("the free run diverges from every starting point".to_owned())
+        })
+    }
+
+    /// Scaled unknowns of parameter values and initial states.
+    pub(crate) fn pack(&self, values: &[f64], states: &[DVector<f64>]) -> DVector<f64> {
+        let mut scaled: Vec<f64> = self
+            .free
+            .iter()
+            .map(|i| self.model.parameters[*i].declaration.nearest(values[*i]))
+            .collect();
+        for x0 in states {
+            scaled.extend(self.visible.iter().map(|s| x0[*s]));
+        }
+        for (value, scale) in scaled.iter_mut().zip(&self.scales) {
+            *value /= scale;
+        }
+        DVector::from_vec(scaled)
+    }
+
+    /// Solves from `values` and `states`.
+    pub(crate) fn solve_from(
+        &mut self,
+        values: &[f64],
+        states: &[DVector<f64>],
+        effort: Effort,
+    ) -> Result<Solution, FitError> {
+        let start = self.pack(values, states);
+        let start = self.balance(start);
+        let found = self.solve(&start, effort)?;
+        let (values, states) = self.unpack(&found);
+        Ok(Solution {
+            values,
+            states,
+            cost: self.residual_vector(&found).norm_squared(),
+        })
+    }
+
+    /// Turns to the second pass if the residuals at `solution` are rounded counts; returns where it
+    /// starts.
+    pub(crate) fn whiten(&mut self, solution: &DVector<f64>) -> Option<DVector<f64>> {
+        let (residual, jacobian) = self.linearise(solution);
+        let blocks = self.blocks(&residual, &jacobian);
+        let n_signals = self.weights.len();
+        let rounding: Vec<f64> = (0..n_signals)
+            .map(|signal| {
+                let series: Vec<&[f64]> = blocks
+                    .iter()
+                    .map(|b| b[signal].residual.as_slice())
+                    .collect();
+                let model = noise::Arma::fit(&series);
+                let rounded = model.c < ROUNDED && model.a.abs() < SLOW;
+                if rounded { model.c } else { 0.0 }
+            })
+            .collect();
+        if rounding.iter().all(|c| *c == 0.0) {
+            return None;
+        }
+        self.rounding = rounding;
+        self.cache.replace(None);
+        let more = self.runs.len() * n_signals;
+        // In units of the first residuals, so that all unknowns are of order one.
+        let scale = residual.norm() / (residual.len() as f64).sqrt();
+        self.scales.extend(std::iter::repeat_n(scale, more));
+        self.lower = self
+            .lower
+            .clone()
+            .resize_vertically(self.scales.len(), f64::NEG_INFINITY);
+        self.upper = self
+            .upper
+            .clone()
+            .resize_vertically(self.scales.len(), f64::INFINITY);
+        Some(solution.clone().resize_vertically(self.scales.len(), 0.0))
+    }
+
+    /// Scales the unknowns so that each moves the residuals alike, as the damping of the solver
+    /// expects (J. J. Moré, 1978, "The Levenberg-Marquardt algorithm", section 6).
+    pub(crate) fn balance(&mut self, mut scaled: DVector<f64>) -> DVector<f64> {
+        let (_, jacobian) = self.linearise(&scaled);
+        for (i, column) in jacobian.column_iter().enumerate() {
+            let norm = column.norm();
+            if norm > DEAD && norm.is_finite() {
+                self.scales[i] /= norm;
+                self.lower[i] *= norm;
+                self.upper[i] *= norm;
+                scaled[i] *= norm;
+            }
+        }
+        self.cache.replace(None);
+        scaled
+    }
+
+    /// First of the unknowns `ε` before the runs.
+    fn first_before(&self) -> usize {
+        self.free.len() + self.runs.len() * self.visible.len()
+    }
+
+    /// In the second pass, turns the weighted residuals of one run into `ε`.
+    fn filter(&self, run: usize, residual: &mut [f64], scaled: &DVector<f64>) {
+        let n_signals = self.weights.len();
+        for (signal, c) in self.rounding.iter().enumerate() {
+            if *c == 0.0 {
+                continue;
+            }
+            let unknown = self.first_before() + run * n_signals + signal;
+            let mut before = scaled[unknown] * self.scales[unknown];
+            for value in residual.iter_mut().skip(signal).step_by(n_signals) {
+                *value -= c * before;
+                before = *value;
+            }
+        }
+    }
+
+    /// As [`Problem::filter`] for the rows of the Jacobian that belong to one run.
+    fn filter_jacobian(
+        &self,
+        run: usize,
+        first_row: usize,
+        rows: usize,
+        jacobian: &mut DMatrix<f64>,
+    ) {
+        let n_signals = self.weights.len();
+        for (signal, c) in self.rounding.iter().enumerate() {
+            if *c == 0.0 {
+                continue;
+            }
+            let unknown = self.first_before() + run * n_signals + signal;
+            for column in 0..jacobian.ncols() {
+                let mut before = if column == unknown {
+                    self.scales[unknown]
+                } else {
+                    0.0
+                };
+                for row in (first_row + signal..first_row + rows).step_by(n_signals) {
+                    let value = &mut jacobian[(row, column)];
+                    *value -= c * before;
+                    before = *value;
+                }
+            }
+        }
+    }
+
+    /// Parameter values and initial states behind scaled unknowns.
+    pub(crate) fn unpack(&self, scaled: &DVector<f64>) -> (Vec<f64>, Vec<DVector<f64>>) {
+        let mut values = nominal(self.model);
+        for (k, i) in self.free.iter().enumerate() {
+            values[*i] = scaled[k] * self.scales[k];
+        }
+        let states = (0..self.runs.len())
+            .map(|run| {
+                if let Some(held) = &self.held {
+                    return held[run].clone();
+                }
+                let mut x0 = DVector::zeros(self.model.n_states());
+                let first = self.free.len() + run * self.visible.len();
+                for (k, state) in self.visible.iter().enumerate() {
+                    x0[*state] = scaled[first + k] * self.scales[first + k];
+                }
+                x0
+            })
+            .collect();
+        (values, states)
+    }
+
+    fn rows(&self) -> usize {
+        self.runs.iter().map(Run::len).sum::<usize>() * self.model.measured.len()
+    }
+
+    /// Weight of row `row` of run `run`; zero where the fit may not look.
+    fn weight(&self, run: usize, row: usize) -> f64 {
+        let n_signals = self.weights.len();
+        if self.seen.is_some_and(|seen| !seen[run][row / n_signals]) {
+            return 0.0;
+        }
+        self.weights[row % n_signals]
+    }
+
+    pub(crate) fn residual_vector(&self, scaled: &DVector<f64>) -> DVector<f64> {
+        let (values, states) = self.unpack(scaled);
+        let mut all = Vec::with_capacity(self.rows());
+        for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
+            let predicted = predict(self.model, &values, x0.as_slice(), run);
+            let mut residual = residuals(&predicted, run);
+            for (row, value) in residual.iter_mut().enumerate() {
+                *value *= self.weight(index, row);
+            }
+            self.filter(index, residual.as_mut_slice(), scaled);
+            all.extend_from_slice(residual.as_slice());
+        }
+        DVector::from_vec(all)
+    }
+
+    /// Weighted residuals, and their Jacobian by the scaled unknowns.
+    pub(crate) fn linearise(&self, scaled: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        if let Some((at, residual, jacobian)) = self.cache.borrow().as_ref()
+            && at == scaled
+        {
+            return (residual.clone(), jacobian.clone());
+        }
+        let (values, states) = self.unpack(scaled);
+        let n_free = self.free.len();
+        let n_visible = self.visible.len();
+        let mut all = DVector::zeros(self.rows());
+        let mut jacobian = DMatrix::zeros(self.rows(), self.scales.len());
+        let mut first_row = 0;
+        for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
+            let x0 = x0.as_slice();
+            let s = sensitivities(self.model, &values, x0, run, &self.free, &self.visible);
+            let residual = residuals(&s.predicted, run);
+            for row in 0..residual.len() {
+                let finite = run.measured[row].is_finite();
+                let weight = if finite { self.weight(index, row) } else { 0.0 };
+                all[first_row + row] = residual[row] * weight;
+                for column in 0..n_free + n_visible {
+                    let to = if column < n_free {
+                        column
+                    } else {
+                        column + index * n_visible
+                    };
+                    jacobian[(first_row + row, to)] =
+                        -s.jacobian[(row, column)] * weight * self.scales[to];
+                }
+            }
+            let rows = residual.len();
+            let of_run = &mut all.as_mut_slice()[first_row..first_row + rows];
+            self.filter(index, of_run, scaled);
+            self.filter_jacobian(index, first_row, rows, &mut jacobian);
+            first_row += rows;
+        }
+        *self.cache.borrow_mut() = Some((scaled.clone(), all.clone(), jacobian.clone()));
+        (all, jacobian)
+    }
+
+    pub(crate) fn solve(
+        &self,
+        start: &DVector<f64>,
+        effort: Effort,
+    ) -> Result<DVector<f64>, FitError> {
+        let solver = BoundedLevenbergMarquardt::<DVector<f64>, DMatrix<f64>>::new()
+            .with_absolute_scaled_gradient_tolerance(1e-14)
+            .with_tau(1e-6)
+            .with_relative_cost_change_tolerance(effort.tolerance)
+            .with_relative_step_tolerance(1e-10);
+        let result = Executor::from_start(Borrowed(self), solver, start.clone())
+            .max_iter(effort.iterations)
+            .run();
+        let result = match result {
+            Ok(result) => result,
+            Err(error) => return Err(FitError::Solver(error.to_string())),
+        };
+        let solution = result.param().clone();
+        if solution.iter().any(|v| !v.is_finite()) {
+            return Err(FitError::Solver(
+                "the parameters left the finite numbers".to_owned(),
+            ));
+        }
+        Ok(solution)
+    }
+
+    /// The estimated parameters, for what is said of flat directions.
+    pub(crate) fn named(&self) -> Vec<Named<'_>> {
+        self.free
+            .iter()
+            .zip(&self.scales)
+            .map(|(i, scale)| {
+                let parameter = &self.model.parameters[*i];
+                Named {
+                    name: &parameter.name,
+                    declared: parameter.declaration.scale,
+                    scale: *scale,
+                }
+            })
+            .collect()
+    }
+
+    /// Residuals and Jacobian by run and signal, in time order.
+    pub(crate) fn blocks(
+        &self,
+        residual: &DVector<f64>,
+        jacobian: &DMatrix<f64>,
+    ) -> Vec<Vec<Block>> {
+        let n_signals = self.weights.len();
+        let mut first_row = 0;
+        self.runs
+            .iter()
+            .map(|run| {
+                let blocks = (0..n_signals)
+                    .map(|signal| {
+                        let rows: Vec<usize> = (0..run.len())
+                            .map(|k| first_row + k * n_signals + signal)
+                            .collect();
+                        Block {
+                            residual: rows.iter().map(|r| residual[*r]).collect(),
+                            jacobian: jacobian.select_rows(&rows),
+                        }
+                    })
+                    .collect();
+                first_row += run.len() * n_signals;
+                blocks
+            })
+            .collect()
+    }
+}
+
+/// The file's values, defaults where it is silent, zero where there is neither.
+fn nominal(model: &Model) -> Vec<f64> {
+    model
+        .parameters
+        .iter()
+        .map(|p| p.value.unwrap_or(0.0))
+        .collect()
+}
+
+/// The problem as the solver sees it.
+struct Borrowed<'p, 'a>(&'p Problem<'a>);
+
+impl Residual for Borrowed<'_, '_> {
+    type Param = DVector<f64>;
+    type Output = DVector<f64>;
+    type Error = Infallible;
+    fn residual(&self, scaled: &DVector<f64>) -> Result<DVector<f64>, Infallible> {
+        Ok(self.0.residual_vector(scaled))
+    }
+}
+
+impl Jacobian for Borrowed<'_, '_> {
+    type Jacobian = DMatrix<f64>;
+    fn jacobian(&self, scaled: &DVector<f64>) -> Result<DMatrix<f64>, Infallible> {
+        let (residual, jacobian) = self.0.linearise(scaled);
+        self.0.evaluations.set(self.0.evaluations.get() + 1);
+        (self.0.progress)(self.0.evaluations.get(), residual.norm());
+        Ok(jacobian)
+    }
+}
+
+impl Constraints for Borrowed<'_, '_> {
+    type Set = ConstraintSet<BoxBounds<DVector<f64>>>;
+    fn constraints(&self) -> <Self::Set as ConstraintDescription>::Borrowed<'_> {
+        ConstraintSet::new().with_bounds(BoxBounds::new(Some(&self.0.lower), Some(&self.0.upper)))
+    }
+}
