@@ -52,7 +52,7 @@ pub struct FigureTrace {
 /// What a line of a picture stands for; colours can be told apart by the colour-blind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
-    /// Measured: grey.
+    /// Measured: a broad grey line, which others can lie upon without hiding it.
     Measured,
     /// The model, or an ideal response: orange.
     Model,
@@ -65,7 +65,7 @@ pub enum Style {
 impl Style {
     fn color(self) -> RGBColor {
         match self {
-            Style::Measured => RGBColor(0x55, 0x55, 0x55),
+            Style::Measured => RGBColor(0xa4, 0xa4, 0xa4),
             Style::Model => RGBColor(0xd5, 0x5e, 0x00),
             Style::Reference => RGBColor(0x00, 0x8f, 0x6b),
             Style::Other => RGBColor(0x00, 0x72, 0xb2),
@@ -73,7 +73,7 @@ impl Style {
     }
 
     fn width(self) -> u32 {
-        if self == Style::Measured { 3 } else { 4 }
+        if self == Style::Measured { 8 } else { 3 }
     }
 }
 
@@ -147,7 +147,11 @@ fn draw_panel<'a>(
         .x_labels(10)
         .y_labels(6)
         .x_label_formatter(&|t| format!("{}", (t * 1000.0).round() / 1000.0))
-        .y_label_formatter(&|v| format!("{v:.decimals$}").replace('-', "−"))
+        .y_label_formatter(&|v| {
+            // A rounding error below zero is no −0.00.
+            let zero = v.abs() < 0.5 * 10f64.powi(-(decimals as i32));
+            format!("{:.decimals$}", if zero { 0.0 } else { *v }).replace('-', "−")
+        })
         .x_desc(if last { "time, s" } else { "" })
         .axis_desc_style(font(TEXT))
         .draw()?;
