@@ -18,6 +18,7 @@ use loopsight_report::{
 use serde::Serialize;
 
 use crate::arguments::RunOptions;
+use crate::commands::simulate::rounded;
 use crate::failure::{self, Failure};
 use crate::{load, output, progress};
 
@@ -350,9 +351,9 @@ impl Recorder {
         }
         self.row.clear();
         self.row.push((time * 1e9).round() / 1e9);
-        self.row.extend_from_slice(step.applied);
-        self.row.extend_from_slice(step.measured);
-        self.row.extend_from_slice(reference);
+        for values in [step.applied, step.measured, reference] {
+            self.row.extend(values.iter().map(|v| rounded(*v)));
+        }
         self.row.push(f64::from(u8::from(step.outcome.saturated)));
     }
 

@@ -110,7 +110,6 @@ fn write(path: &Path, model: &Model, run: &Run) -> Result<(), Failure> {
     headers.extend(model.measured.iter().map(|m| header(m.signal)));
     let mut rows = Vec::with_capacity(run.len() * headers.len());
     for k in 0..run.len() {
-        // Nine digits are far below any sensor's noise and keep logs small.
         rows.push(rounded(run.time[k]));
         rows.extend(
             run.input(k)
@@ -123,6 +122,6 @@ fn write(path: &Path, model: &Model, run: &Run) -> Result<(), Failure> {
 }
 
 /// Without the digits that are rounding errors of the simulation.
-fn rounded(value: f64) -> f64 {
+pub(crate) fn rounded(value: f64) -> f64 {
     (value * 1e12).round() / 1e12
 }
