@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::config::{ConfigError, Source, Step, nearest};
-use crate::model::{Attached, Model, ModelParameter, signal_index};
+use crate::model::{Attached, Model, ModelParameter, signal_index, signals};
 use crate::registry::{AnyPhysics, EffectPart};
 use crate::{Channel, EffectMeta, PlantMeta, Role};
 
@@ -92,14 +92,19 @@ fn bind(
         .collect();
     let first_parameter = parameters.len();
     for (declaration, given) in meta.parameters.iter().zip(given) {
+        let (unit, size) = at.first().map_or_else(
+            || (declaration.unit.to_owned(), 1.0),
+            |channel| unit_at(declaration.unit, channel, plant),
+        );
+        let acts = declaration.sides.is_empty()
+            || at.iter().any(|c| declaration.sides.contains(&c.side));
         parameters.push(ModelParameter {
             name: format!("{}.{}", meta.id, declaration.id),
             declaration,
-            unit: declaration
-                .unit
-                .replace("channel", at.first().map_or("1", |c| c.unit)),
-            value: given.or(declaration.default),
-            free: declaration.estimated,
+            unit,
+            value: given.or(declaration.default.map(|d| d * size)),
+            free: declaration.estimated && acts,
+            size,
             path: base
                 .iter()
                 .cloned()
@@ -147,6 +152,43 @@ impl Model {
     }
 }
 
+/// The unit of an effect's parameter at a channel, and what 1 of its default and scale is there:
+/// `channel`, `flow` and `position` are filled in.
+///
+/// `channel/flow^2` at a wheel is `V/(rad/s)^2`.
+pub fn unit_at(unit: &str, channel: &Channel, plant: &'static PlantMeta) -> (String, f64) {
+    let signal = |role| {
+        let index = channel.read(role).and_then(|id| signal_index(plant, id));
+        index
+            .and_then(|i| signals(plant).nth(i))
+            .map_or(("1", 1.0), |s| (s.unit, s.size))
+    };
+    let mut filled = unit.to_owned();
+    let mut total = 1.0;
+    for (word, (unit_here, size)) in [
+        ("channel", (channel.unit, channel.size)),
+        ("flow", signal(Role::Flow)),
+        ("position", signal(Role::Position)),
+    ] {
+        let Some((before, after)) = unit.split_once(word) else {
+            continue;
+        };
+        let power: i32 = after
+            .strip_prefix('^')
+            .and_then(|p| p.split([' ', '/']).next()?.parse().ok())
+            .unwrap_or(1);
+        let divides = before.ends_with('/');
+        total *= size.powi(if divides { -power } else { power });
+        let alone = !unit_here.contains(['/', ' ']) || (before.is_empty() && power == 1);
+        filled = if alone {
+            filled.replace(word, unit_here)
+        } else {
+            filled.replace(word, &format!("({unit_here})"))
+        };
+    }
+    (filled, total)
+}
+
 /// Why an effect cannot act on a channel; `None` when it can.
 pub fn misfit(channel: &Channel, effect: &EffectMeta) -> Option<String> {
     let kind = channel.place.kind();
@@ -156,6 +198,15 @@ pub fn misfit(channel: &Channel, effect: &EffectMeta) -> Option<String> {
             "it is a place of kind `{}`, expected `{}`",
             kind.name(),
             kinds.join("` or `")
+        ));
+    }
+    if effect.sided && channel.side == 0 {
+        return Some("it acts oppositely on two sides, and this channel has none".to_owned());
+    }
+    if let Some(role) = effect.yields_to.iter().find(|r| channel.read(**r).is_some()) {
+        return Some(format!(
+            "where there is a {} another effect says it more precisely",
+            role.name()
         ));
     }
     effect

@@ -62,9 +62,9 @@ pub enum Role {
     Drive,
     /// Heading of a vehicle.
     Heading,
-    /// Forward speed of a vehicle.
+    /// Forward speed of a vehicle, where the channel acts along its heading.
     Forward,
-    /// Yaw rate of a vehicle.
+    /// Yaw rate of a vehicle, where the channel acts about the vertical.
     Yaw,
     /// Load on the common supply: the sum of the magnitudes of the currents, or of what stands for
     /// them.
@@ -73,11 +73,13 @@ pub enum Role {
     Armature,
     /// Acceleration by turning, per unit of the centre of mass's offset.
     Centrifugal,
+    /// Angle of a shaft with a motor or an encoder: what is uneven there repeats with its turns.
+    Shaft,
 }
 
 impl Role {
     /// Number of roles.
-    pub const COUNT: usize = 9;
+    pub const COUNT: usize = 10;
     /// All of them, in order.
     pub const ALL: [Role; Role::COUNT] = [
         Role::Flow,
@@ -89,6 +91,7 @@ impl Role {
         Role::Load,
         Role::Armature,
         Role::Centrifugal,
+        Role::Shaft,
     ];
 
     /// Name used in messages.
@@ -103,6 +106,7 @@ impl Role {
             Role::Load => "supply load",
             Role::Armature => "armature voltage",
             Role::Centrifugal => "acceleration by turning",
+            Role::Shaft => "shaft angle",
         }
     }
 }
@@ -127,6 +131,10 @@ pub struct Channel {
     /// `+1` or `-1` where channels come in pairs (right, left), else 0: effects that act
     /// oppositely on the two sides multiply by it.
     pub side: i8,
+    /// Size of what matters here, in its unit: about what 1 V or 1 rad/s at a shaft comes to.
+    /// Defaults, scales and starts of effect parameters count in it, so that one declaration
+    /// serves volts at a wheel and m/s² at a body.
+    pub size: f64,
     /// One sentence.
     pub doc: &'static str,
 }

@@ -23,8 +23,13 @@ pub struct EffectMeta {
     pub places: &'static [PlaceKind],
     /// Roles it reads at its channel; a channel that does not offer them all is refused.
     pub reads: &'static [Role],
-    /// Its parameters, shared by all the channels of one instance. A parameter with unit
-    /// `channel` has the unit of the channel; `channel/x` that unit divided by `x`.
+    /// Channels that offer one of these are left to a more specific effect, and refused.
+    pub yields_to: &'static [Role],
+    /// It acts oppositely on two sides; a channel without a [`crate::Channel::side`] is refused.
+    pub sided: bool,
+    /// Its parameters, shared by all the channels of one instance. In their units `channel` stands
+    /// for the unit of the channel, `flow` and `position` for those of the signals with these
+    /// roles there; such parameters count in sizes, see [`crate::Channel::size`].
     pub parameters: &'static [Parameter],
     /// Acts on all its channels together, as one instance: one supply, one body.
     pub shared_only: bool,
@@ -35,6 +40,28 @@ pub struct EffectMeta {
     /// It looks back in time at its channel, through [`Reading::past`]. Such effects are evaluated
     /// first at their channel, once per integration step.
     pub memory: bool,
+}
+
+impl EffectMeta {
+    /// Nothing filled in, and nothing special: what most effects write `..EffectMeta::PLAIN` for.
+    pub const PLAIN: Self = Self {
+        id: "",
+        summary: "",
+        symptom: "",
+        remedy: "",
+        equation: "",
+        reference: "",
+        example: "",
+        places: &[],
+        reads: &[],
+        yields_to: &[],
+        sided: false,
+        shared_only: false,
+        simpler: &[],
+        parameters: &[],
+        states: 0,
+        memory: false,
+    };
 }
 
 /// What an effect sees at one of its channels at one instant.
@@ -53,6 +80,8 @@ pub struct Reading<'a, S> {
     pub nominal: S,
     /// `+1`, `-1` or `0`, see [`crate::Channel::side`].
     pub side: S,
+    /// The channel's own signal is the one that plays [`Role::Position`]: an angle, not its rate.
+    pub is_position: bool,
     /// The signals by role; roles that the effect does not declare are zero.
     pub roles: [S; Role::COUNT],
     /// The channel's nominal value in the past.

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 pub use crate::affine::Affine;
-pub use crate::attach::misfit;
+pub use crate::attach::{misfit, unit_at};
 use crate::attach::{attach, make_names_unique};
 use crate::config::{ConfigError, ReadError, Source, Step, nearest, read_text};
 use crate::registry::{AnyDynamics, AnyPhysics, EffectPart, HostReal, PlantPart};
@@ -105,8 +105,29 @@ pub struct ModelParameter {
     pub value: Option<f64>,
     /// A fit estimates it.
     pub free: bool,
+    /// What 1 of the declaration's default, scale and starts is here, in `unit`: 1 for parameters
+    /// of a plant, for those of an effect see [`crate::Channel::size`].
+    pub size: f64,
     /// Where it stands in the file.
     pub path: Vec<Step>,
+}
+
+impl ModelParameter {
+    /// Size of a noticeable change, in `unit`.
+    pub fn scale(&self) -> f64 {
+        self.declaration.scale * self.size
+    }
+
+    /// Values from which a fit to a recording of `duration` s should start; empty where one start
+    /// will do.
+    pub fn starts(&self, duration: f64) -> Vec<f64> {
+        let unit = if self.declaration.starts_in_durations {
+            duration
+        } else {
+            self.size
+        };
+        self.declaration.starts.iter().map(|s| s * unit).collect()
+    }
 }
 
 /// An effect of a composed model, bound to its channels.
@@ -214,6 +235,7 @@ impl Model {
                 unit: declaration.unit.to_owned(),
                 value: given.or(declaration.default),
                 free: declaration.estimated,
+                size: 1.0,
                 path: prefix
                     .iter()
                     .cloned()

@@ -38,6 +38,11 @@ pub struct Parameter {
     pub scale: f64,
     /// Values a fit should start from where its surface has several minima; empty: one start.
     pub starts: &'static [f64],
+    /// `starts` are fractions of the duration of the recording.
+    pub starts_in_durations: bool,
+    /// Sides on which it acts, see [`crate::Channel::side`]; empty: everywhere. Where an effect is
+    /// attached to none of them a fit holds it.
+    pub sides: &'static [i8],
 }
 
 impl Parameter {
@@ -61,6 +66,8 @@ impl Parameter {
             linear: true,
             scale: 1.0,
             starts: &[],
+            starts_in_durations: false,
+            sides: &[],
         }
     }
 
@@ -113,6 +120,19 @@ impl Parameter {
     /// Values a fit should start from where its surface has several minima.
     pub const fn starting_at(mut self, starts: &'static [f64]) -> Self {
         self.starts = starts;
+        self
+    }
+
+    /// Fractions of the recording's duration at which a fit should start.
+    pub const fn starting_within(mut self, fractions: &'static [f64]) -> Self {
+        self.starts = fractions;
+        self.starts_in_durations = true;
+        self
+    }
+
+    /// Acts on these sides only.
+    pub const fn on_sides(mut self, sides: &'static [i8]) -> Self {
+        self.sides = sides;
         self
     }
 

@@ -14,6 +14,8 @@ pub struct Signal {
     pub unit: &'static str,
     /// One sentence.
     pub doc: &'static str,
+    /// Size of a value that matters, in its unit, see [`crate::Channel::size`].
+    pub size: f64,
 }
 
 impl Signal {
@@ -29,6 +31,13 @@ impl Signal {
             symbol,
             unit,
             doc,
+            size: 1.0,
         }
+    }
+
+    /// Size of a value that matters; 1 unless said otherwise.
+    pub const fn sized(mut self, size: f64) -> Self {
+        self.size = size;
+        self
     }
 }

@@ -108,12 +108,19 @@ const PHYSICAL: [Parameter; 7] = [
     .scaled(1e-5),
 ];
 
-const READS: [Reads; 5] = [
+const MOTOR: [Reads; 6] = [
     Reads(Role::Flow, "speed"),
     Reads(Role::Position, "angle"),
     Reads(Role::Drive, "voltage"),
     Reads(Role::Load, "supply_load"),
     Reads(Role::Armature, "armature"),
+    Reads(Role::Shaft, "angle"),
+];
+/// Where efforts are accelerations, volts over the winding say nothing.
+const LOAD: [Reads; 3] = [
+    Reads(Role::Flow, "speed"),
+    Reads(Role::Position, "angle"),
+    Reads(Role::Shaft, "angle"),
 ];
 
 const CHANNELS: [Channel; 6] = [
@@ -122,8 +129,9 @@ const CHANNELS: [Channel; 6] = [
         place: Place::Effort(0),
         unit: "V",
         equation: "V -> V + w",
-        reads: &READS,
+        reads: &MOTOR,
         side: 0,
+        size: 1.0,
         doc: "the shaft; efforts in volts of equivalent motor voltage",
     },
     Channel {
@@ -131,8 +139,9 @@ const CHANNELS: [Channel; 6] = [
         place: Place::Effort(1),
         unit: "rad/s^2",
         equation: "ω' -> ω' + w",
-        reads: &READS,
+        reads: &LOAD,
         side: 0,
+        size: 1.0,
         doc: "the load; efforts as angular acceleration",
     },
     Channel {
@@ -140,8 +149,9 @@ const CHANNELS: [Channel; 6] = [
         place: Place::Rate(0),
         unit: "rad/s^2",
         equation: "ω' -> ω' + w(ω')",
-        reads: &READS,
+        reads: &LOAD,
         side: 0,
+        size: 1.0,
         doc: "the acceleration itself: where inertia acts",
     },
     Channel {
@@ -149,8 +159,9 @@ const CHANNELS: [Channel; 6] = [
         place: Place::Input(0),
         unit: "V",
         equation: "V -> V + w(V)",
-        reads: &READS,
+        reads: &MOTOR,
         side: 0,
+        size: 1.0,
         doc: "between the commanded and the effective voltage",
     },
     Channel {
@@ -158,8 +169,9 @@ const CHANNELS: [Channel; 6] = [
         place: Place::Output(0),
         unit: "rad/s",
         equation: "ω_measured = ω + w",
-        reads: &READS,
+        reads: &MOTOR,
         side: 0,
+        size: 1.0,
         doc: "measurement of the speed",
     },
     Channel {
@@ -167,8 +179,9 @@ const CHANNELS: [Channel; 6] = [
         place: Place::Output(1),
         unit: "rad",
         equation: "φ_measured = φ + w",
-        reads: &READS,
+        reads: &MOTOR,
         side: 0,
+        size: 1.0,
         doc: "measurement of the angle",
     },
 ];

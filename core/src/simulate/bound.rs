@@ -2,7 +2,7 @@
 
 use crate::model::{Attached, Model};
 use crate::registry::HostReal;
-use crate::{Past, Place, Reading, Role};
+use crate::{Channel, Past, Place, Reading, Role};
 
 /// An effect at one channel.
 #[derive(Clone, Debug)]
@@ -11,6 +11,7 @@ pub(super) struct Bound {
     pub(super) effect: usize,
     pub(super) place: Place,
     side: f64,
+    is_position: bool,
     reads: [Option<usize>; Role::COUNT],
     /// First of its states in the extended state vector.
     pub(super) z: usize,
@@ -50,6 +51,8 @@ impl Bounds {
                     effect: index,
                     place: channel.place,
                     side: f64::from(channel.side),
+                    is_position: matches!(channel.place, Place::Output(i)
+                        if reads_position(model, channel) == Some(i)),
                     reads: *reads,
                     z: first + bounds.states,
                     n_z: effect.meta.states,
@@ -102,6 +105,11 @@ impl Bounds {
     }
 }
 
+fn reads_position(model: &Model, channel: &Channel) -> Option<usize> {
+    let id = channel.read(Role::Position)?;
+    model.find_signal(id).ok()
+}
+
 /// What an effect is evaluated with.
 pub(super) struct Scene<'a, S> {
     pub(super) model: &'a Model,
@@ -133,6 +141,7 @@ impl<S: HostReal> Scene<'_, S> {
             to: self.interval.1,
             nominal,
             side: S::of(bound.side),
+            is_position: bound.is_position,
             roles,
             past,
         }

@@ -159,15 +159,15 @@ pub(super) const STATES: [Signal; 6] = [
         "v",
         "m/s",
         "forward speed midway between the wheels",
-    ),
+    ).sized(0.05),
     Signal::new(
         "angular_velocity",
         "ω",
         "rad/s",
         "yaw rate, positive to the left",
-    ),
-    Signal::new("heading", "θ", "rad", "heading, positive to the left"),
-    Signal::new("travel", "s", "m", "distance travelled along the path"),
+    ).sized(0.4),
+    Signal::new("heading", "θ", "rad", "heading, positive to the left").sized(0.4),
+    Signal::new("travel", "s", "m", "distance travelled along the path").sized(0.05),
     Signal::new("position_x", "x", "m", "position, x"),
     Signal::new("position_y", "y", "m", "position, y"),
 ];
@@ -195,13 +195,13 @@ pub(super) const OUTPUTS: [Signal; 11] = [
         "v_r",
         "m/s",
         "speed of the right wheel over ground",
-    ),
+    ).sized(0.05),
     Signal::new(
         "track_speed_left",
         "v_l",
         "m/s",
         "speed of the left wheel over ground",
-    ),
+    ).sized(0.05),
     Signal::new(
         "shaft_angle_right",
         "φ_r",
@@ -253,39 +253,35 @@ pub(super) const INTEGRALS: [(&str, &str); 4] = [
     ("shaft_speed_left", "shaft_angle_left"),
 ];
 
-pub(super) const WHEEL_RIGHT: [Reads; 8] = [
+pub(super) const WHEEL_RIGHT: [Reads; 7] = [
     Reads(Role::Flow, "shaft_speed_right"),
     Reads(Role::Position, "shaft_angle_right"),
     Reads(Role::Drive, "voltage_right"),
     Reads(Role::Heading, "heading"),
-    Reads(Role::Forward, "linear_velocity"),
-    Reads(Role::Yaw, "angular_velocity"),
     Reads(Role::Load, "supply_load"),
     Reads(Role::Armature, "armature_right"),
+    Reads(Role::Shaft, "shaft_angle_right"),
 ];
-pub(super) const WHEEL_LEFT: [Reads; 8] = [
+pub(super) const WHEEL_LEFT: [Reads; 7] = [
     Reads(Role::Flow, "shaft_speed_left"),
     Reads(Role::Position, "shaft_angle_left"),
     Reads(Role::Drive, "voltage_left"),
     Reads(Role::Heading, "heading"),
-    Reads(Role::Forward, "linear_velocity"),
-    Reads(Role::Yaw, "angular_velocity"),
     Reads(Role::Load, "supply_load"),
     Reads(Role::Armature, "armature_left"),
+    Reads(Role::Shaft, "shaft_angle_left"),
 ];
-pub(super) const BODY_FORWARD: [Reads; 6] = [
+pub(super) const BODY_FORWARD: [Reads; 5] = [
     Reads(Role::Flow, "linear_velocity"),
     Reads(Role::Position, "travel"),
     Reads(Role::Heading, "heading"),
     Reads(Role::Forward, "linear_velocity"),
-    Reads(Role::Yaw, "angular_velocity"),
     Reads(Role::Centrifugal, "centrifugal_forward"),
 ];
-pub(super) const BODY_YAW: [Reads; 6] = [
+pub(super) const BODY_YAW: [Reads; 5] = [
     Reads(Role::Flow, "angular_velocity"),
     Reads(Role::Position, "heading"),
     Reads(Role::Heading, "heading"),
-    Reads(Role::Forward, "linear_velocity"),
     Reads(Role::Yaw, "angular_velocity"),
     Reads(Role::Centrifugal, "centrifugal_yaw"),
 ];
@@ -298,6 +294,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "V_r -> V_r + w",
         reads: &WHEEL_RIGHT,
         side: 1,
+        size: 1.0,
         doc: "shaft of the right wheel; efforts in volts of equivalent motor voltage",
     },
     Channel {
@@ -307,6 +304,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "V_l -> V_l + w",
         reads: &WHEEL_LEFT,
         side: -1,
+        size: 1.0,
         doc: "shaft of the left wheel; efforts in volts of equivalent motor voltage",
     },
     Channel {
@@ -316,6 +314,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "v' -> v' + w",
         reads: &BODY_FORWARD,
         side: 1,
+        size: 0.25,
         doc: "the body along its heading; efforts as acceleration",
     },
     Channel {
@@ -325,6 +324,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "ω' -> ω' + w",
         reads: &BODY_YAW,
         side: -1,
+        size: 1.0,
         doc: "the body about the vertical; efforts as angular acceleration",
     },
     Channel {
@@ -334,6 +334,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "v' -> v' + w(v')",
         reads: &BODY_FORWARD,
         side: 1,
+        size: 0.25,
         doc: "the forward acceleration itself: where mass acts",
     },
     Channel {
@@ -343,6 +344,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "ω' -> ω' + w(ω')",
         reads: &BODY_YAW,
         side: -1,
+        size: 1.0,
         doc: "the yaw acceleration itself: where inertia acts",
     },
     Channel {
@@ -352,6 +354,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "V_r -> V_r + w(V_r)",
         reads: &WHEEL_RIGHT,
         side: 1,
+        size: 1.0,
         doc: "between the commanded and the effective voltage of the right motor",
     },
     Channel {
@@ -361,6 +364,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "V_l -> V_l + w(V_l)",
         reads: &WHEEL_LEFT,
         side: -1,
+        size: 1.0,
         doc: "between the commanded and the effective voltage of the left motor",
     },
     Channel {
@@ -370,6 +374,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "v_measured = v + w",
         reads: &BODY_FORWARD,
         side: 0,
+        size: 0.05,
         doc: "measurement of the forward speed",
     },
     Channel {
@@ -379,6 +384,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "ω_measured = ω + w",
         reads: &BODY_YAW,
         side: 0,
+        size: 0.4,
         doc: "measurement of the yaw rate",
     },
     Channel {
@@ -388,6 +394,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "v_r_measured = v_r + w",
         reads: &WHEEL_RIGHT,
         side: 1,
+        size: 0.05,
         doc: "measurement of the right wheel's speed over ground",
     },
     Channel {
@@ -397,6 +404,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "v_l_measured = v_l + w",
         reads: &WHEEL_LEFT,
         side: -1,
+        size: 0.05,
         doc: "measurement of the left wheel's speed over ground",
     },
     Channel {
@@ -406,6 +414,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "φ_r_counted = φ_r + w",
         reads: &WHEEL_RIGHT,
         side: 1,
+        size: 1.0,
         doc: "the right wheel's encoder, behind every signal that is made from its counts",
     },
     Channel {
@@ -415,6 +424,7 @@ pub(super) const CHANNELS: [Channel; 14] = [
         equation: "φ_l_counted = φ_l + w",
         reads: &WHEEL_LEFT,
         side: -1,
+        size: 1.0,
         doc: "the left wheel's encoder, behind every signal that is made from its counts",
     },
 ];

@@ -37,15 +37,16 @@ impl Effect<2, 0> for CoulombFriction {
         example: "[[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel = 0.9\n",
         places: &[PlaceKind::Effort],
         reads: &[Role::Flow],
+        yields_to: &[Role::Yaw],
         parameters: &[
             Parameter::new("level", "c", "channel", "size of the friction")
                 .within(0.0, f64::INFINITY)
                 .or(0.0)
-                .scaled(0.1),
+                .scaled(0.3),
             Parameter::new(
                 "width",
                 "s",
-                "rad/s",
+                "flow",
                 "speed below which the sign is smoothed",
             )
             .above(0.0)
@@ -54,10 +55,7 @@ impl Effect<2, 0> for CoulombFriction {
             .nonlinear()
             .scaled(0.1),
         ],
-        shared_only: false,
-        simpler: &[],
-        states: 0,
-        memory: false,
+        ..EffectMeta::PLAIN
     };
 
     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 2]) -> S {

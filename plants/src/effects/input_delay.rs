@@ -31,7 +31,6 @@ impl Effect<1, 0> for InputDelay {
         reference: "Åström, Wittenmark (1997), Computer-Controlled Systems, 3rd ed., section 2.3",
         example: "[[effect]]\n[effect.input_delay]\nat = [\"input.right\", \"input.left\"]\ndelay = 0.02\n",
         places: &[PlaceKind::Input],
-        reads: &[],
         parameters: &[
             Parameter::new("delay", "τ", "s", "time from the log to the actuator")
                 .within(0.0, 0.5)
@@ -39,10 +38,8 @@ impl Effect<1, 0> for InputDelay {
                 .nonlinear()
                 .scaled(0.01),
         ],
-        shared_only: false,
-        simpler: &[],
-        states: 0,
         memory: true,
+        ..EffectMeta::PLAIN
     };
 
     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 1]) -> S {
