@@ -90,7 +90,18 @@ impl<S: HostReal> History<S> {
         }
     }
 
-    /// Integral and value at `time`. Before the first and after the last entry the signal is held.
+    /// The value at `time`; one that is held has jumped by the time of its entry.
+    fn instant(&self, time: S) -> S {
+        if self.between == Between::Held
+            && let Some(entry) = self.entries.iter().find(|e| e.time == time.value())
+        {
+            return entry.value;
+        }
+        self.at(time).1
+    }
+
+    /// Integral and value at `time`, at an entry from the side before it: what a delay of zero is
+    /// differentiated to. Before the first and after the last entry the signal is held.
     fn at(&self, time: S) -> (S, S) {
         let n = self.entries.len();
         if n == 0 {
@@ -99,7 +110,7 @@ impl<S: HostReal> History<S> {
         let (mut low, mut high) = (0, n);
         while high - low > 1 {
             let middle = usize::midpoint(low, high);
-            if self.entry(middle).time <= time.value() {
+            if self.entry(middle).time < time.value() {
                 low = middle
             } else {
                 high = middle
@@ -132,13 +143,16 @@ impl<S: HostReal> Past<S> for History<S> {
         if span.value() > 0.0 {
             (self.at(to).0 - self.at(from).0) / span
         } else {
-            self.at(to).1
+            // The limit of the mean, with its derivatives by both bounds.
+            (self.instant(from) + self.instant(to)) * S::of(0.5)
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use crate::{Dual, Real, derivative, variable};
+
     use super::*;
 
     #[test]
@@ -164,6 +178,25 @@ mod tests {
             assert!((h.mean(t, t) - 3.0 * t * t).abs() < 1e-12, "{t}");
         }
         assert!((h.mean(0.3, 1.1) - (1.1f64.powi(3) - 0.3f64.powi(3)) / 0.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_delay_of_zero_has_its_one_sided_derivative() {
+        let delay = variable(0.0, 0);
+        let mut smooth = History::<Dual>::new(Between::Smooth);
+        let mut held = History::<Dual>::new(Between::Held);
+        for k in 0..4 {
+            let t = 0.5 * f64::from(k);
+            smooth.pass(t, Dual::of(3.0 * t * t), Dual::of(t * t * t));
+            held.hold(t, Dual::of(f64::from(k)));
+        }
+        let now = Dual::of(1.5);
+        let late = smooth.mean(now - delay, now - delay);
+        assert!((derivative(&late, 0) + 9.0).abs() < 1e-12);
+        let window = smooth.mean(now - delay, now);
+        assert!((derivative(&window, 0) + 4.5).abs() < 1e-12);
+        let step = held.mean(now - delay, Dual::of(2.0) - delay);
+        assert!((derivative(&step, 0) + 2.0).abs() < 1e-12);
     }
 
     #[test]
