@@ -96,8 +96,8 @@ fn bind(
             || (declaration.unit.to_owned(), 1.0),
             |channel| unit_at(declaration.unit, channel, plant),
         );
-        let acts = declaration.sides.is_empty()
-            || at.iter().any(|c| declaration.sides.contains(&c.side));
+        let acts =
+            declaration.sides.is_empty() || at.iter().any(|c| declaration.sides.contains(&c.side));
         parameters.push(ModelParameter {
             name: format!("{}.{}", meta.id, declaration.id),
             declaration,
@@ -203,7 +203,11 @@ pub fn misfit(channel: &Channel, effect: &EffectMeta) -> Option<String> {
     if effect.sided && channel.side == 0 {
         return Some("it acts oppositely on two sides, and this channel has none".to_owned());
     }
-    if let Some(role) = effect.yields_to.iter().find(|r| channel.read(**r).is_some()) {
+    if let Some(role) = effect
+        .yields_to
+        .iter()
+        .find(|r| channel.read(**r).is_some())
+    {
         return Some(format!(
             "where there is a {} another effect says it more precisely",
             role.name()

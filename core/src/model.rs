@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 pub use crate::affine::Affine;
-pub use crate::attach::{misfit, unit_at};
 use crate::attach::{attach, make_names_unique};
+pub use crate::attach::{misfit, unit_at};
 use crate::config::{ConfigError, ReadError, Source, Step, nearest, read_text};
 use crate::registry::{AnyDynamics, AnyPhysics, EffectPart, HostReal, PlantPart};
 use crate::run::LogMap;

@@ -159,13 +159,15 @@ pub(super) const STATES: [Signal; 6] = [
         "v",
         "m/s",
         "forward speed midway between the wheels",
-    ).sized(0.05),
+    )
+    .sized(0.05),
     Signal::new(
         "angular_velocity",
         "ω",
         "rad/s",
         "yaw rate, positive to the left",
-    ).sized(0.4),
+    )
+    .sized(0.4),
     Signal::new("heading", "θ", "rad", "heading, positive to the left").sized(0.4),
     Signal::new("travel", "s", "m", "distance travelled along the path").sized(0.05),
     Signal::new("position_x", "x", "m", "position, x"),
@@ -195,13 +197,15 @@ pub(super) const OUTPUTS: [Signal; 11] = [
         "v_r",
         "m/s",
         "speed of the right wheel over ground",
-    ).sized(0.05),
+    )
+    .sized(0.05),
     Signal::new(
         "track_speed_left",
         "v_l",
         "m/s",
         "speed of the left wheel over ground",
-    ).sized(0.05),
+    )
+    .sized(0.05),
     Signal::new(
         "shaft_angle_right",
         "φ_r",

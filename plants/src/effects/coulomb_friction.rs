@@ -16,6 +16,8 @@ use loopsight_core::{
 /// | `level` | size of the friction | that of the channel, e.g. V |
 /// | `width` | speed below which the sign is smoothed | that of the flow |
 ///
+/// On a channel about the vertical of a vehicle this is `scrub_friction`.
+///
 /// The smoothing stands for the sign function, which no integrator with fixed steps can follow;
 /// `width` belongs well below the speeds of interest and is not estimated. At rest the model
 /// creeps instead of sticking.
@@ -68,23 +70,14 @@ declare_effect!(CoulombFriction, "coulomb_friction", <2, 0>);
 
 #[cfg(test)]
 mod tests {
-    use loopsight_core::NoPast;
+    use crate::effects::testing::*;
 
     use super::*;
 
     #[test]
     fn opposes_the_motion_with_its_level() {
-        let mut at = Reading {
-            time: 0.0,
-            from: 0.0,
-            to: 0.0,
-            nominal: 0.0,
-            side: 1.0,
-            roles: [0.0; Role::COUNT],
-            past: &NoPast,
-        };
         for (flow, expected) in [(5.0, -0.9), (-5.0, 0.9), (0.0, 0.0)] {
-            at.roles[Role::Flow as usize] = flow;
+            let at = reading(&[(Role::Flow, flow)]);
             let w: f64 = CoulombFriction::contribution(&at, &[], &[0.9, 0.1]);
             assert!((w - expected).abs() < 1e-12, "{flow}: {w}");
         }

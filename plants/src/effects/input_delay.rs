@@ -52,7 +52,9 @@ declare_effect!(InputDelay, "input_delay", <1, 0>);
 
 #[cfg(test)]
 mod tests {
-    use loopsight_core::{Past, Role};
+    use loopsight_core::Past;
+
+    use crate::effects::testing::*;
 
     use super::*;
 
@@ -72,9 +74,8 @@ mod tests {
                 from,
                 to: from + 0.01,
                 nominal: 1.0,
-                side: 0.0,
-                roles: [0.0; Role::COUNT],
                 past: &Step,
+                ..reading(&[])
             };
             1.0 + InputDelay::contribution(&at, &[], &[0.035])
         };
