@@ -32,6 +32,12 @@ pub(crate) enum Command {
     Compare(CompareOptions),
     /// Find the parameters of a model from a log, with intervals.
     Fit(FitOptions),
+    /// Find out which physical effect a model lacks.
+    Diagnose(DiagnoseOptions),
+    /// Add an effect to a model file, with neutral parameters.
+    Add(AddOptions),
+    /// Diagnose, add, refit, until nothing more is missing.
+    Improve(ImproveOptions),
     /// Run a control loop.
     Run(RunOptions),
     /// Print a completion script for a shell.
@@ -136,6 +142,55 @@ pub(crate) enum SchemeName {
     Euler,
     /// Integrated over the sampling period.
     Integrated,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DiagnoseOptions {
+    /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
+    #[arg(required = true, num_args = 1..=2, value_names = ["MODEL] [LOG"])]
+    pub(crate) files: Vec<PathBuf>,
+    /// Judge on this log; without it, on parts of LOG that the fits do not see.
+    #[arg(long, value_name = "LOG2")]
+    pub(crate) test: Option<PathBuf>,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write a page with pictures; opens offline in any browser.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) html: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct AddOptions {
+    /// Model file.
+    pub(crate) model: PathBuf,
+    /// Id of the effect; `loopsight list effects` shows them.
+    pub(crate) effect: String,
+    /// Channels it acts on; by default all of the first kind it fits.
+    #[arg(long, value_name = "CHANNEL", num_args = 1..)]
+    pub(crate) at: Vec<String>,
+    /// The model file to write.
+    #[arg(short, long, value_name = "NEW")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ImproveOptions {
+    /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
+    #[arg(required = true, num_args = 1..=2, value_names = ["MODEL] [LOG"])]
+    pub(crate) files: Vec<PathBuf>,
+    /// Judge on this log; without it, on parts of LOG that the fits do not see.
+    #[arg(long, value_name = "LOG2")]
+    pub(crate) test: Option<PathBuf>,
+    /// Write the best model here: the model file with the effects added and all values fitted.
+    #[arg(short, long, value_name = "BEST")]
+    pub(crate) output: Option<PathBuf>,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write a page with pictures; opens offline in any browser.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) html: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -61,6 +61,9 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         Command::Simulate(options) => commands::simulate::run(options),
         Command::Compare(options) => commands::compare::run(options),
         Command::Fit(options) => commands::fit::run(options),
+        Command::Diagnose(options) => commands::diagnose::run(options),
+        Command::Add(options) => commands::add::run(options),
+        Command::Improve(options) => commands::improve::run(options),
         Command::Run(options) => commands::run::run(options),
         Command::Completions { shell } => {
             commands::completions::run(*shell);

@@ -209,6 +209,36 @@ impl Source {
         document.to_string()
     }
 
+    /// The text with an `[[effect]]` at the end of those it has: its id, channels and parameters.
+    pub fn with_effect(&self, id: &str, at: &[&str], parameters: &[(&str, f64)]) -> String {
+        let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
+            return self.text.clone();
+        };
+        let mut part = toml_edit::Table::new();
+        part.insert(
+            "at",
+            toml_edit::value(at.iter().copied().collect::<toml_edit::Array>()),
+        );
+        for (name, value) in parameters {
+            part.insert(name, toml_edit::value(*value));
+        }
+        let mut entry = toml_edit::Table::new();
+        entry.insert(id, Item::Table(part));
+        let effects = document
+            .entry("effect")
+            .or_insert(Item::ArrayOfTables(toml_edit::ArrayOfTables::new()));
+        match effects {
+            Item::ArrayOfTables(effects) => effects.push(entry),
+            // `effect = []`, as an inline array
+            other => {
+                let mut effects = toml_edit::ArrayOfTables::new();
+                effects.push(entry);
+                *other = Item::ArrayOfTables(effects);
+            }
+        }
+        document.to_string()
+    }
+
     /// Where the value at `path`, or the deepest known part of it, stands; with `key`, where the
     /// last key of the path stands.
     fn locate(&self, path: &[Step], key: bool) -> Range<usize> {

@@ -36,9 +36,6 @@ pub struct Parameter {
     pub linear: bool,
     /// Size of a noticeable change, in the parameter's unit: scales a fit when the value is zero.
     pub scale: f64,
-    /// Share of the root mean square of the channel's flow that a diagnosis gives the parameter; 0:
-    /// the default stays. A smoothing width that suits a robot's wheels does not suit a flywheel.
-    pub share_of_flow: f64,
     /// Values a fit should start from where its surface has several minima; empty: one start.
     pub starts: &'static [f64],
     /// `starts` are fractions of the duration of the recording.
@@ -68,7 +65,6 @@ impl Parameter {
             estimated: true,
             linear: true,
             scale: 1.0,
-            share_of_flow: 0.0,
             starts: &[],
             starts_in_durations: false,
             sides: &[],
@@ -118,12 +114,6 @@ impl Parameter {
     /// Size of a noticeable change, in the parameter's unit.
     pub const fn scaled(mut self, scale: f64) -> Self {
         self.scale = scale;
-        self
-    }
-
-    /// Share of the root mean square of the channel's flow that a diagnosis gives the parameter.
-    pub const fn share_of_flow(mut self, share: f64) -> Self {
-        self.share_of_flow = share;
         self
     }
 

@@ -1,9 +1,16 @@
 //! Hold a model against measurements: free run and one-step prediction ([`compare`](compare())),
 //! recursive and output-error fits ([`fit`]) with intervals that mean what they say.
 
+mod advice;
+mod candidates;
 mod compare;
+mod diagnose;
 pub mod fit;
 mod flatness;
+mod floor;
+mod holdout;
+mod improve;
+mod judge;
 mod noise;
 mod output_error;
 mod prediction;
@@ -11,9 +18,15 @@ mod problem;
 mod regression;
 mod rls;
 mod score;
+mod sufficiency;
 pub mod tracking;
+mod where_it_fails;
 
+pub use advice::Advice;
 pub use compare::{CompareError, Comparison, RunTrace, SignalTrace, compare};
+pub use diagnose::{Conclusion, Diagnosis, Explanation, Level, Place, diagnose};
 pub use fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
+pub use improve::{Improvement, Step, improve};
 pub use regression::{Regression, Scheme};
 pub use score::SignalScore;
+pub use where_it_fails::Statement;

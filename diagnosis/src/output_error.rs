@@ -53,7 +53,8 @@ pub(crate) fn fit(
 }
 
 impl Problem<'_> {
-    fn result(&self, solution: &DVector<f64>) -> Fit {
+    /// What is said of a solution.
+    pub(crate) fn result(&self, solution: &DVector<f64>) -> Fit {
         let (mut values, _) = self.unpack(solution);
         for i in &self.free {
             // The solver stays strictly inside the range; at its end the end is meant.

@@ -88,6 +88,32 @@ pub(crate) fn predict(model: &Model, values: &[f64], x0: &[f64], run: &Run) -> V
     predicted
 }
 
+/// Root mean squares of the plant's signals over the free runs.
+pub(crate) fn signal_rms(
+    model: &Model,
+    values: &[f64],
+    states: &[DVector<f64>],
+    runs: &[Run],
+) -> Vec<f64> {
+    let mut squares = vec![0.0; model.n_signals()];
+    let mut n = 0.0f64;
+    let mut simulator = Simulator::new(model, values);
+    for (run, x0) in runs.iter().zip(states) {
+        for k in 0..run.len() {
+            if k == 0 {
+                simulator.reset(x0.as_slice(), run.input(0));
+            } else {
+                simulator.advance(run.time[k], run.input(k - 1));
+            }
+            for (sum, value) in squares.iter_mut().zip(simulator.signals()) {
+                *sum += value * value;
+            }
+            n += 1.0;
+        }
+    }
+    squares.iter().map(|s| (s / n.max(1.0)).sqrt()).collect()
+}
+
 /// Estimated initial plant states, one per run.
 pub(crate) struct InitialStates {
     pub(crate) states: Vec<DVector<f64>>,

@@ -7,7 +7,7 @@ use basin::{
     BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet, Constraints,
     Executor, Jacobian, Residual,
 };
-use loopsight_core::model::Model;
+use loopsight_core::model::{Model, pseudo_inverse};
 use loopsight_core::run::Run;
 use nalgebra::{DMatrix, DVector};
 
@@ -77,8 +77,6 @@ pub(crate) struct Solution {
     pub(crate) values: Vec<f64>,
     /// Initial states by run.
     pub(crate) states: Vec<DVector<f64>>,
-    /// Weighted sum of squares: the mean of the signals' squared `nrmse` on what the fit saw.
-    pub(crate) cost: f64,
 }
 
 impl<'a> Problem<'a> {
@@ -226,13 +224,33 @@ impl<'a> Problem<'a> {
     ) -> Result<Solution, FitError> {
         let start = self.pack(values, states);
         let start = self.balance(start);
-        let found = self.solve(&start, effort)?;
-        let (values, states) = self.unpack(&found);
-        Ok(Solution {
-            values,
-            states,
-            cost: self.residual_vector(&found).norm_squared(),
-        })
+        self.finish(&start, effort)
+    }
+
+    /// Solves from scaled unknowns.
+    pub(crate) fn finish(
+        &self,
+        start: &DVector<f64>,
+        effort: Effort,
+    ) -> Result<Solution, FitError> {
+        Ok(self.solution(&self.solve(start, effort)?))
+    }
+
+    /// Cost that one full Gauss–Newton step from `values` would reach if the model were linear in
+    /// its unknowns.
+    pub(crate) fn promise(&self, values: &[f64], states: &[DVector<f64>]) -> Option<f64> {
+        let (residual, jacobian) = self.linearise(&self.pack(values, states));
+        let gram = jacobian.tr_mul(&jacobian);
+        let right = jacobian.tr_mul(&residual);
+        let step = pseudo_inverse(&gram)? * &right;
+        let cost = residual.norm_squared() - right.dot(&step);
+        cost.is_finite().then_some(cost.max(0.0))
+    }
+
+    /// What scaled unknowns stand for.
+    pub(crate) fn solution(&self, scaled: &DVector<f64>) -> Solution {
+        let (values, states) = self.unpack(scaled);
+        Solution { values, states }
     }
 
     /// Turns to the second pass if the residuals at `solution` are rounded counts; returns where it

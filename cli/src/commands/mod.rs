@@ -1,10 +1,13 @@
 //! One file per command.
 
+pub(crate) mod add;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod completions;
+pub(crate) mod diagnose;
 pub(crate) mod explain;
 pub(crate) mod fit;
+pub(crate) mod improve;
 pub(crate) mod list;
 pub(crate) mod run;
 pub(crate) mod simulate;

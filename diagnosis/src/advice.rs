@@ -1,0 +1,73 @@
+//! What to do next.
+
+use loopsight_core::model::Model;
+use serde::Serialize;
+
+use crate::diagnose::{Conclusion, Explanation};
+
+/// An experiment and what it is good for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Advice {
+    /// Why.
+    pub why: String,
+    /// What to record.
+    pub experiment: String,
+}
+
+pub(crate) fn advice(
+    model: &Model,
+    verdict: Conclusion,
+    best: Option<&Explanation>,
+) -> Vec<Advice> {
+    let mut list = Vec::new();
+    if let (Conclusion::EffectMissing, Some(best)) = (verdict, best) {
+        for other in &best.indistinguishable_from {
+            list.push(Advice {
+                why: format!(
+                    "these data cannot tell `{}` at {} from `{}` at {}",
+                    best.place.effect,
+                    best.place.at.join(", "),
+                    other.effect,
+                    other.at.join(", ")
+                ),
+                experiment: separating(&best.place.effect, &other.effect),
+            });
+        }
+    }
+    if verdict == Conclusion::UnknownEffect {
+        list.push(Advice {
+            why: "no effect of the library explains what the model does not".to_owned(),
+            experiment: format!(
+                "record several levels of each input of `{}`, slow ramps through zero and rests, and look at the residual against each quantity on the page",
+                model.plant.id
+            ),
+        });
+    }
+    list
+}
+
+/// The experiment that separates two effects.
+fn separating(a: &str, b: &str) -> String {
+    let either = |names: &[&str]| names.contains(&a) || names.contains(&b);
+    if either(&[
+        "input_delay",
+        "actuator_lag",
+        "sensor_delay",
+        "sensor_lag",
+        "sensor_window",
+    ]) {
+        "fast steps and a chirp up to the loop's bandwidth, sampled as fast as the sensor allows; for input against sensor delay, disturb the robot by hand: a disturbance passes the sensor only".to_owned()
+    } else if either(&[
+        "dead_zone",
+        "coulomb_friction",
+        "stribeck_friction",
+        "input_saturation",
+        "gain_asymmetry",
+    ]) {
+        "several levels of the input, slow ramps through zero in both directions, and coasting from speed with the input at zero".to_owned()
+    } else if either(&["wheel_radius_mismatch", "sensor_scale", "encoder_ripple"]) {
+        "a straight run and turns on the spot in both directions, with the position measured from outside".to_owned()
+    } else {
+        "inputs of several levels and frequencies, both directions of motion, turns and straight runs".to_owned()
+    }
+}

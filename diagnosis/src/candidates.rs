@@ -1,0 +1,135 @@
+//! Everything the library could add to a model, and where.
+
+use loopsight_core::model::{Model, misfit};
+use loopsight_core::registry;
+use loopsight_core::sensor::Sensor;
+use loopsight_core::{Channel, EffectMeta, Place, Role};
+
+/// An effect at a set of channels.
+#[derive(Clone, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) meta: &'static EffectMeta,
+    pub(crate) at: Vec<&'static str>,
+    /// The model with it, at neutral parameters.
+    pub(crate) model: Model,
+    /// Root mean square of the flow at its channels in the recording; 0 where there is none.
+    pub(crate) flow: f64,
+}
+
+impl Candidate {
+    /// Parameters of the model that the candidate brought, by index.
+    pub(crate) fn own(&self) -> std::ops::Range<usize> {
+        let n = self.model.parameters.len();
+        n - self.meta.parameters.len()..n
+    }
+
+    /// How many of them a fit estimates.
+    pub(crate) fn complexity(&self) -> usize {
+        self.own()
+            .filter(|i| self.model.parameters[*i].free)
+            .count()
+    }
+}
+
+/// All candidates for `model`: each effect at every single channel it fits, and at all channels of a
+/// family (both wheels, all inputs) alike. What the model already has at the same channels, and
+/// what acts on a signal that is not measured, is left out.
+///
+/// `rms` holds the root mean squares of the plant's signals in the recording: smoothing widths are
+/// set from it, since what suits a robot's wheels does not suit a flywheel.
+pub(crate) fn candidates(model: &Model, rms: &[f64]) -> Vec<Candidate> {
+    let mut found = Vec::new();
+    for meta in registry::effects() {
+        for at in channel_sets(model, meta) {
+            let present = model
+                .effects
+                .iter()
+                .any(|e| e.meta.id == meta.id && e.at.iter().any(|c| at.contains(&c.id)));
+            if present {
+                continue;
+            }
+            if let Some(mut with) = model.with_effect(meta.id, &at) {
+                let flow = suit(&mut with, meta, rms);
+                found.push(Candidate {
+                    meta,
+                    at,
+                    model: with,
+                    flow,
+                });
+            }
+        }
+    }
+    found
+}
+
+/// Share of the flow over which a sign is smoothed.
+const WIDTH: f64 = 0.02;
+
+/// Gives the last effect of `model` the widths that suit the recording; returns the root mean
+/// square of the flow at its channels.
+fn suit(model: &mut Model, meta: &EffectMeta, rms: &[f64]) -> f64 {
+    let Some(effect) = model.effects.last() else {
+        return 0.0;
+    };
+    let flow = effect
+        .at
+        .iter()
+        .filter_map(|c| model.find_signal(c.read(Role::Flow)?).ok())
+        .filter_map(|i| rms.get(i).copied())
+        .fold(0.0, f64::max);
+    let first = effect.first_parameter;
+    for (i, declaration) in meta.parameters.iter().enumerate() {
+        if declaration.unit == "flow" && !declaration.estimated && flow > 0.0 {
+            model.parameters[first + i].value = Some(WIDTH * flow);
+        }
+    }
+    flow
+}
+
+fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<&'static str>> {
+    let fitting: Vec<&'static Channel> = model
+        .plant
+        .channels
+        .iter()
+        .filter(|c| misfit(c, meta).is_none() && is_seen(model, c))
+        .collect();
+    let mut families: Vec<(&str, Vec<&'static Channel>)> = Vec::new();
+    for channel in fitting {
+        let family = channel.id.split('.').next().unwrap_or(channel.id);
+        match families.iter_mut().find(|(name, _)| *name == family) {
+            Some((_, members)) => members.push(channel),
+            None => families.push((family, vec![channel])),
+        }
+    }
+    // Parameters in the channel's unit mean the same at channels of one unit only.
+    let in_unit_of_channel = meta.parameters.iter().any(|p| p.unit.contains("channel"));
+    let mut sets = Vec::new();
+    for (_, members) in families {
+        let alike = members.len() > 1
+            && (!in_unit_of_channel || members.iter().all(|c| c.unit == members[0].unit));
+        if alike || meta.shared_only {
+            sets.push(members.iter().map(|c| c.id).collect());
+        }
+        if !meta.shared_only {
+            sets.extend(
+                members
+                    .iter()
+                    .filter(|_| members.len() > 1 || !alike)
+                    .map(|c| vec![c.id]),
+            );
+        }
+    }
+    sets
+}
+
+/// Whether what happens at a channel can show in what is measured.
+fn is_seen(model: &Model, channel: &Channel) -> bool {
+    let Place::Output(index) = channel.place else {
+        return true;
+    };
+    model.measured.iter().any(|m| {
+        m.index == index
+            || matches!(&m.sensor, Sensor::EncoderCounts(encoder)
+                if encoder.of.keys().any(|s| model.find_signal(s) == Ok(index)))
+    })
+}

@@ -1,0 +1,99 @@
+//! Diagnose, add, refit, until nothing more is missing.
+
+use loopsight_core::model::Model;
+use loopsight_core::run::Run;
+use loopsight_recordings::Fault;
+use serde::Serialize;
+
+use crate::diagnose::{Conclusion, Diagnosis, Place, diagnose};
+use crate::fit::{Fit, FitError, FitSettings, fit};
+
+/// One step of an improvement.
+#[derive(Clone, Debug, Serialize)]
+pub struct Step {
+    /// What was added; `null` for the model as it was.
+    pub added: Option<Place>,
+    /// Free-run error on what the model was fitted to.
+    pub nrmse_fit: f64,
+    /// Free-run error on what it was not fitted to.
+    pub nrmse_test: f64,
+}
+
+/// The result of [`improve`].
+#[derive(Debug, Serialize)]
+pub struct Improvement {
+    /// The model as it was, then each addition.
+    pub steps: Vec<Step>,
+    /// What the last diagnosis concludes.
+    pub verdict: Conclusion,
+    /// The diagnoses, one per round.
+    #[serde(skip)]
+    pub diagnoses: Vec<Diagnosis>,
+    /// The best model, fitted to all of the log; none where a diagnosis was refused.
+    #[serde(skip)]
+    pub best: Option<Fit>,
+}
+
+/// Most effects that are added: beyond that a library is fitting, not explaining.
+const MOST: usize = 6;
+
+/// Repeats [`diagnose`], adding what it finds missing, until it finds nothing more.
+///
+/// `progress` gets the round, and the candidates done and in all.
+pub fn improve(
+    model: &Model,
+    runs: &[Run],
+    test: Option<&[Run]>,
+    faults: &[Fault],
+    progress: &(dyn Fn(usize, u64, u64) + Sync),
+) -> Result<Improvement, FitError> {
+    let mut present = model.clone();
+    let mut steps: Vec<Step> = Vec::new();
+    let mut diagnoses = Vec::new();
+    let verdict = loop {
+        let round = diagnoses.len();
+        let diagnosis = diagnose(&present, runs, test, faults, &|done, total| {
+            progress(round, done, total)
+        })?;
+        let verdict = diagnosis.verdict;
+        if let Some(fitted) = &diagnosis.model {
+            if steps.is_empty() {
+                steps.push(Step {
+                    added: None,
+                    nrmse_fit: diagnosis.nominal_fit,
+                    nrmse_test: diagnosis.nominal.nrmse,
+                });
+                present = fitted.clone();
+            }
+        }
+        let next = match (&diagnosis.missing, diagnosis.candidates.first()) {
+            (Some(_), Some(best)) if round < MOST => Some(best.clone()),
+            _ => None,
+        };
+        diagnoses.push(diagnosis);
+        let Some(best) = next else { break verdict };
+        steps.push(Step {
+            added: Some(best.place.clone()),
+            nrmse_fit: best.nrmse_fit,
+            nrmse_test: best.nrmse,
+        });
+        present = best.model;
+    };
+    let best = match verdict {
+        Conclusion::LogFaulty | Conclusion::DataInsufficient => None,
+        _ => Some(fit(
+            &present,
+            runs,
+            test,
+            faults,
+            &FitSettings::default(),
+            &|_, _| {},
+        )?),
+    };
+    Ok(Improvement {
+        steps,
+        verdict,
+        diagnoses,
+        best,
+    })
+}

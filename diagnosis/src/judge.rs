@@ -1,0 +1,81 @@
+//! Which of two models explains held-out data better, and whether that means anything.
+
+/// Weighted squared errors of the samples that judge, in time order; runs stand one after the
+/// other.
+pub(crate) type Losses = Vec<f64>;
+
+/// Mean difference of two loss series over its standard error (F. X. Diebold, R. S. Mariano, 1995,
+/// "Comparing predictive accuracy", Journal of Business & Economic Statistics 13, 253–263, with
+/// Bartlett's window): positive where `b` is the better one.
+pub(crate) fn advantage(a: &Losses, b: &Losses) -> f64 {
+    let n = a.len().min(b.len());
+    if n < 8 {
+        return 0.0;
+    }
+    let differences: Vec<f64> = a.iter().zip(b).map(|(x, y)| x - y).collect();
+    let mean = differences.iter().sum::<f64>() / n as f64;
+    let lags = ((n as f64).sqrt() as usize).min(100);
+    let gamma = |lag: usize| {
+        differences[lag..]
+            .iter()
+            .zip(&differences)
+            .map(|(x, y)| (x - mean) * (y - mean))
+            .sum::<f64>()
+            / n as f64
+    };
+    let mut variance = gamma(0);
+    for lag in 1..=lags {
+        variance += 2.0 * (1.0 - lag as f64 / (lags + 1) as f64) * gamma(lag);
+    }
+    let error = (variance.max(0.0) / n as f64).sqrt();
+    if error > 0.0 {
+        mean / error
+    } else if mean == 0.0 {
+        0.0
+    } else {
+        mean.signum() * f64::INFINITY
+    }
+}
+
+/// Root of the mean loss: the `nrmse` over the samples that judge.
+pub(crate) fn nrmse(losses: &Losses) -> f64 {
+    (losses.iter().sum::<f64>() / losses.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(n: usize, seed: u64) -> Vec<f64> {
+        let mut state = seed;
+        (0..n)
+            .map(|_| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+            })
+            .collect()
+    }
+
+    #[test]
+    fn equal_models_are_seldom_told_apart() {
+        let mut beyond = 0;
+        for seed in 0..200 {
+            let a: Losses = noise(1000, 2 * seed + 1).iter().map(|e| e * e).collect();
+            let b: Losses = noise(1000, 2 * seed + 2).iter().map(|e| e * e).collect();
+            if advantage(&a, &b).abs() > 1.96 {
+                beyond += 1;
+            }
+        }
+        assert!((2..=24).contains(&beyond), "{beyond} of 200");
+    }
+
+    #[test]
+    fn a_smaller_error_wins() {
+        let a: Losses = noise(1000, 1).iter().map(|e| (1.2 * e).powi(2)).collect();
+        let b: Losses = noise(1000, 2).iter().map(|e| e * e).collect();
+        assert!(advantage(&a, &b) > 4.0);
+        assert!(advantage(&b, &a) < -4.0);
+    }
+}
