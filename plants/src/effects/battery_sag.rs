@@ -16,10 +16,10 @@ use loopsight_core::{
 /// | `load` | sum of the magnitudes of the voltages over all windings, proportional to the currents | V |
 /// | `resistance` | share of the supply lost per volt of load: internal resistance of the battery over that of a winding, over the nominal supply | 1/V |
 ///
-/// Assumptions: the load is taken at the nominal commands, and the division stands for the feedback that
-/// a lower supply lowers the currents (to first order it is `u - resistance · load · u`); the supply
-/// feels the motor currents themselves, not their duty cycle; the battery has no memory (no diffusion,
-/// no state of charge).
+/// Assumptions: the load is taken at the nominal commands, and the division stands for the
+/// feedback that a lower supply lowers the currents (to first order it is `u - resistance · load ·
+/// u`); the supply feels the motor currents themselves, not their duty cycle; the battery has no
+/// memory (no diffusion, no state of charge).
 ///
 /// Reference: G. L. Plett (2015), "Battery Management Systems, Volume 1: Battery Modeling", Artech
 /// House, chapter 2, equivalent series resistance.

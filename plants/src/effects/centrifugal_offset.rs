@@ -4,7 +4,8 @@ use loopsight_core::{
     Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
 };
 
-/// The centre of mass off the axle: turning pushes the vehicle forward, and driving resists turning.
+/// The centre of mass off the axle: turning pushes the vehicle forward, and driving resists
+/// turning.
 ///
 /// ```text
 /// v' gets  forward · ω²          ω' gets  -yaw · v ω
@@ -16,13 +17,13 @@ use loopsight_core::{
 /// | `forward` | what `K_B` is short of: the offset, less what the rotors carry | m/rad² |
 /// | `yaw` | what `K_E` is short of, `m d/(I + m d²)` | 1/m |
 ///
-/// For a rigid body with its centre of mass `d` ahead of the axle both have the sign of `d`. Where the
-/// plant's own `K_B` and `K_E` are estimated they take this up, and the effect adds nothing.
+/// For a rigid body with its centre of mass `d` ahead of the axle both have the sign of `d`. Where
+/// the plant's own `K_B` and `K_E` are estimated they take this up, and the effect adds nothing.
 ///
 /// Assumptions: a rigid body in the plane; no load that swings.
 ///
-/// Reference: T. G. Alves, W. F. Lages, R. V. B. Henriques (2018), IFAC PapersOnLine 51-15, 437–442,
-/// equations (17), (31), (34), (37).
+/// Reference: T. G. Alves, W. F. Lages, R. V. B. Henriques (2018), IFAC PapersOnLine 51-15,
+/// 437–442, equations (17), (31), (34), (37).
 #[derive(Clone, Copy, Debug)]
 pub struct CentrifugalOffset;
 

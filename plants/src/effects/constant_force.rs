@@ -12,8 +12,8 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, de
 /// |---|---|---|
 /// | `force` | the effort, always the same | that of the channel |
 ///
-/// Assumptions: independent of speed, position and time. On a shaft that one input drives it cannot be
-/// told from an offset of that input.
+/// Assumptions: independent of speed, position and time. On a shaft that one input drives it
+/// cannot be told from an offset of that input.
 ///
 /// Reference: A. Janot, M. Gautier, M. Brunot (2019), "Data set and reference models of EMPS",
 /// Workshop on Nonlinear System Identification Benchmarks (the offset of the friction model).

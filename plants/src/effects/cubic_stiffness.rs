@@ -16,10 +16,11 @@ use loopsight_core::{
 /// | `stiffness` | force per cubed way | that of the channel over that of the position cubed |
 /// | `rest` | position without force | that of the position |
 ///
-/// Assumptions: no hysteresis, no linear part (add `linear_stiffness` for that). `rest` is not estimated unless the
-/// file frees it: the position of most logs begins at rest.
+/// Assumptions: no hysteresis, no linear part (add `linear_stiffness` for that). `rest` is not
+/// estimated unless the file frees it: the position of most logs begins at rest.
 ///
-/// Reference: G. Duffing (1918), "Erzwungene Schwingungen bei veränderlicher Eigenfrequenz", Vieweg.
+/// Reference: G. Duffing (1918), "Erzwungene Schwingungen bei veränderlicher Eigenfrequenz",
+/// Vieweg.
 #[derive(Clone, Copy, Debug)]
 pub struct CubicStiffness;
 

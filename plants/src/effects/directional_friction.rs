@@ -18,16 +18,16 @@ use loopsight_core::{
 /// | `viscous_*` | friction per speed in that direction | that of the channel over that of the flow |
 /// | `width` | speed below which the sign is smoothed | that of the flow |
 ///
-/// Assumptions: the friction depends on the present direction only, not on how long it has lasted. The
-/// contribution is continuous at rest, so that no force is left there.
+/// Assumptions: the friction depends on the present direction only, not on how long it has lasted.
+/// The contribution is continuous at rest, so that no force is left there.
 ///
 /// Of the viscous parts a plant with a damping of its own sees the difference; the mean adds to its
 /// damping and cannot be told from it.
 ///
-/// Reference: B. Armstrong-Hélouvry (1991), "Control of Machines with Friction", Kluwer (friction of an
-/// arm measured in both directions); A. Janot, M. Gautier, M. Brunot (2019), "Data set and reference
-/// models of EMPS", Workshop on Nonlinear System Identification Benchmarks (Coulomb, viscous and an
-/// offset that makes the two directions differ).
+/// Reference: B. Armstrong-Hélouvry (1991), "Control of Machines with Friction", Kluwer (friction
+/// of an arm measured in both directions); A. Janot, M. Gautier, M. Brunot (2019), "Data set and
+/// reference models of EMPS", Workshop on Nonlinear System Identification Benchmarks (Coulomb,
+/// viscous and an offset that makes the two directions differ).
 #[derive(Clone, Copy, Debug)]
 pub struct DirectionalFriction;
 

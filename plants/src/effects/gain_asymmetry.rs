@@ -17,8 +17,8 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, de
 ///
 /// If only the speeds of the wheels are logged it cannot be told from wheels of different size.
 ///
-/// Reference: T. G. Alves, W. F. Lages, R. V. B. Henriques (2018), IFAC PapersOnLine 51-15, 437–442:
-/// what the assumption of equal motors in (11)–(16) leaves out.
+/// Reference: T. G. Alves, W. F. Lages, R. V. B. Henriques (2018), IFAC PapersOnLine 51-15,
+/// 437–442: what the assumption of equal motors in (11)–(16) leaves out.
 #[derive(Clone, Copy, Debug)]
 pub struct GainAsymmetry;
 

@@ -17,14 +17,14 @@ use loopsight_core::{
 /// | `sine` | effort at angle π/2 | that of the channel |
 ///
 /// An arm that is level at angle zero and rises with it has `cosine = -m g l` (in the unit of the
-/// channel) and `sine = 0`; one that hangs there has `cosine = 0`, `sine = -m g l`. With two components
-/// the zero of the encoder does not matter.
+/// channel) and `sine = 0`; one that hangs there has `cosine = 0`, `sine = -m g l`. With two
+/// components the zero of the encoder does not matter.
 ///
-/// Assumptions: a rigid arm on a horizontal axis; a gear between shaft and arm is not seen (the angle is
-/// that of the shaft that carries the arm).
+/// Assumptions: a rigid arm on a horizontal axis; a gear between shaft and arm is not seen (the
+/// angle is that of the shaft that carries the arm).
 ///
-/// Reference: M. W. Spong, S. Hutchinson, M. Vidyasagar (2006), "Robot Modeling and Control", Wiley,
-/// chapter 7, the single link.
+/// Reference: M. W. Spong, S. Hutchinson, M. Vidyasagar (2006), "Robot Modeling and Control",
+/// Wiley, chapter 7, the single link.
 #[derive(Clone, Copy, Debug)]
 pub struct GravityPendulum;
 

@@ -19,12 +19,12 @@ use loopsight_core::{
 /// The two components are linear; slope and direction follow from them:
 /// `sin(slope) = √(cosine² + sine²)/g`, `uphill = atan2(-sine, -cosine)`.
 ///
-/// Assumptions: one plane for the whole log, a heading that is that of the model (integrated from the
-/// yaw rate); the force across the heading is carried by the wheels. The moment that a centre of mass
-/// off the axle would add to the yaw is left out.
+/// Assumptions: one plane for the whole log, a heading that is that of the model (integrated from
+/// the yaw rate); the force across the heading is carried by the wheels. The moment that a centre
+/// of mass off the axle would add to the yaw is left out.
 ///
-/// Reference: J. Y. Wong (2008), "Theory of Ground Vehicles", 4th edition, Wiley, section 3.1, grade
-/// resistance.
+/// Reference: J. Y. Wong (2008), "Theory of Ground Vehicles", 4th edition, Wiley, section 3.1,
+/// grade resistance.
 #[derive(Clone, Copy, Debug)]
 pub struct GravitySlope;
 

@@ -13,8 +13,9 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, de
 /// | `u` | the command | that of the channel |
 /// | `offset` | what is added | that of the channel |
 ///
-/// Assumptions: constant over the log. Where an effort channel has the same sign and gain as the input (a
-/// wheel of a `ddmr`, the shaft of a `dc_axis`) it cannot be told from a constant force there.
+/// Assumptions: constant over the log. Where an effort channel has the same sign and gain as the
+/// input (a wheel of a `ddmr`, the shaft of a `dc_axis`) it cannot be told from a constant force
+/// there.
 ///
 /// Reference: L. Ljung (1999), "System Identification", 2nd edition, section 14.1, drifts and
 /// detrending.

@@ -13,10 +13,11 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, de
 /// | `u` | the command | that of the channel |
 /// | `limit` | the most the actuator gives | that of the channel |
 ///
-/// Assumptions: the same in both directions, sharp. A limit above the largest command of the log has no
-/// influence, and the log says nothing of it; the neutral value is far above any.
+/// Assumptions: the same in both directions, sharp. A limit above the largest command of the log
+/// has no influence, and the log says nothing of it; the neutral value is far above any.
 ///
-/// Reference: T. Hu, Z. Lin (2001), "Control Systems with Actuator Saturation", Birkhäuser, chapter 1.
+/// Reference: T. Hu, Z. Lin (2001), "Control Systems with Actuator Saturation", Birkhäuser,
+/// chapter 1.
 #[derive(Clone, Copy, Debug)]
 pub struct InputSaturation;
 

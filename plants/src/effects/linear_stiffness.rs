@@ -16,8 +16,9 @@ use loopsight_core::{
 /// | `stiffness` | force per way | that of the channel over that of the position |
 /// | `rest` | position without force | that of the position |
 ///
-/// Assumptions: no hysteresis, no stop at the end of the travel. `rest` is not estimated unless the
-/// file frees it: the position of most logs begins at rest; a constant force beside the spring moves it.
+/// Assumptions: no hysteresis, no stop at the end of the travel. `rest` is not estimated unless
+/// the file frees it: the position of most logs begins at rest; a constant force beside the spring
+/// moves it.
 ///
 /// Reference: R. Hooke (1678), "De Potentia Restitutiva".
 #[derive(Clone, Copy, Debug)]

@@ -16,12 +16,12 @@ use loopsight_core::{
 /// | `level` | yaw acceleration that the scrub takes | that of the channel, rad/s² |
 /// | `width` | yaw rate below which the sign is smoothed | rad/s |
 ///
-/// Assumptions: the moment does not depend on the forward speed. (It does: a wheel that rolls fast is
-/// dragged sideways at a smaller slip angle, so the level is that of turning on the spot and of slow
-/// arcs.) Attaches only to a channel about the vertical.
+/// Assumptions: the moment does not depend on the forward speed. (It does: a wheel that rolls fast
+/// is dragged sideways at a smaller slip angle, so the level is that of turning on the spot and of
+/// slow arcs.) Attaches only to a channel about the vertical.
 ///
-/// Reference: J. Y. Wong (2008), "Theory of Ground Vehicles", 4th edition, Wiley, section 6.1, moment
-/// of turning resistance.
+/// Reference: J. Y. Wong (2008), "Theory of Ground Vehicles", 4th edition, Wiley, section 6.1,
+/// moment of turning resistance.
 #[derive(Clone, Copy, Debug)]
 pub struct ScrubFriction;
 

@@ -13,11 +13,11 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, de
 /// | `y` | the signal, as the sensor makes it (at an instant, or a mean over the last period) | that of the channel |
 /// | `delay` | age of the measurement when it is stamped | s |
 ///
-/// Assumptions: constant over the log. For a plant that does not change with time it cannot be told from
-/// a delay of the input, unless several sensors have different ones.
+/// Assumptions: constant over the log. For a plant that does not change with time it cannot be
+/// told from a delay of the input, unless several sensors have different ones.
 ///
-/// Reference: K. J. Åström, B. Wittenmark (1997), "Computer-Controlled Systems", 3rd edition, section
-/// 2.3.
+/// Reference: K. J. Åström, B. Wittenmark (1997), "Computer-Controlled Systems", 3rd edition,
+/// section 2.3.
 #[derive(Clone, Copy, Debug)]
 pub struct SensorDelay;
 

@@ -13,7 +13,8 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, de
 /// | `y` | the signal | that of the channel |
 /// | `offset` | what is added | that of the channel |
 ///
-/// Assumptions: constant over the log. On an encoder that only speeds are made from it has no influence.
+/// Assumptions: constant over the log. On an encoder that only speeds are made from it has no
+/// influence.
 ///
 /// Reference: D. H. Titterton, J. L. Weston (2004), "Strapdown Inertial Navigation Technology", 2nd
 /// edition, IET, chapter 4, fixed bias.

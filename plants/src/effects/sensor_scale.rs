@@ -13,9 +13,9 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, de
 /// | `y` | the signal | that of the channel |
 /// | `error` | relative error of the scale | 1 |
 ///
-/// Assumptions: the same at all levels and in both directions. Where every gain of the plant from the
-/// inputs to this signal is estimated, they take it up; it shows where signals depend on each other (a
-/// pose beside a speed, wheels beside the body).
+/// Assumptions: the same at all levels and in both directions. Where every gain of the plant from
+/// the inputs to this signal is estimated, they take it up; it shows where signals depend on each
+/// other (a pose beside a speed, wheels beside the body).
 ///
 /// Reference: D. H. Titterton, J. L. Weston (2004), "Strapdown Inertial Navigation Technology", 2nd
 /// edition, IET, chapter 4, scale-factor error.

@@ -18,8 +18,8 @@ use loopsight_core::{
 /// | `speed` | Stribeck speed: where the extra friction has fallen to 1/e | that of the flow |
 /// | `width` | speed below which the sign is smoothed | that of the flow |
 ///
-/// Assumptions: the friction follows the speed at once (no frictional lag, no presliding); `width` is
-/// well below `speed`. The exponent is that of a Gaussian.
+/// Assumptions: the friction follows the speed at once (no frictional lag, no presliding); `width`
+/// is well below `speed`. The exponent is that of a Gaussian.
 ///
 /// Reference: B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit (1994), "A survey of models,
 /// analysis tools and compensation methods for the control of machines with friction", Automatica

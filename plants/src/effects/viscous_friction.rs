@@ -18,8 +18,8 @@ use loopsight_core::{
 /// Assumptions: laminar lubrication; the same forwards and backwards.
 ///
 /// Where the plant has a damping of its own that a fit estimates (`K_A` and `K_D` of a `ddmr` with
-/// both wheels alike, `K_A` of a `dc_axis`) the two cannot be told apart: only their sum counts. One
-/// wheel alone, or a plant whose damping is known, is another matter.
+/// both wheels alike, `K_A` of a `dc_axis`) the two cannot be told apart: only their sum counts.
+/// One wheel alone, or a plant whose damping is known, is another matter.
 ///
 /// Reference: O. Reynolds (1886), Philosophical Transactions 177, 157–234; H. Olsson et al. (1998),
 /// "Friction models and friction compensation", European Journal of Control 4, 176–195, section 2.

@@ -15,13 +15,13 @@ use loopsight_core::{
 /// | `angle` | what the encoder would count with the nominal radius, or a wheel's speed made from it | that of the channel |
 /// | `mismatch` | half the relative difference of the radii, right above left | 1 |
 ///
-/// A larger wheel turns less for the same way over ground. Assumptions: the body moves as the model says;
-/// only what the encoders make of it changes. (A larger wheel also pushes less and runs faster at the
-/// same voltage; that is a `gain_asymmetry` beside it.)
+/// A larger wheel turns less for the same way over ground. Assumptions: the body moves as the
+/// model says; only what the encoders make of it changes. (A larger wheel also pushes less and
+/// runs faster at the same voltage; that is a `gain_asymmetry` beside it.)
 ///
-/// Reference: J. Borenstein, L. Feng (1996), "Measurement and correction of systematic odometry errors in
-/// mobile robots", IEEE Transactions on Robotics and Automation 12(6), 869–880: unequal wheel diameters,
-/// `E_d`, of the UMBmark test.
+/// Reference: J. Borenstein, L. Feng (1996), "Measurement and correction of systematic odometry
+/// errors in mobile robots", IEEE Transactions on Robotics and Automation 12(6), 869–880: unequal
+/// wheel diameters, `E_d`, of the UMBmark test.
 #[derive(Clone, Copy, Debug)]
 pub struct WheelRadiusMismatch;
 

@@ -1,0 +1,120 @@
+//! A load that is taken up or set down.
+
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+
+/// Payload change: from an unknown time on the mass and the inertia are others.
+///
+/// ```text
+/// v' = nominal · (1/(1 + fraction · H(t)))          H(t) = ½ (1 + tanh((t - time)/width))
+/// ```
+///
+/// | symbol | what | unit |
+/// |---|---|---|
+/// | `nominal` | the rate without the effect | that of the channel |
+/// | `fraction` | relative growth of the mass, or of the inertia of an axis | 1 |
+/// | `yaw_fraction` | relative growth of the inertia about the vertical of a vehicle | 1 |
+/// | `time` | when it changes, since the start of each run | s |
+/// | `width` | how long the change takes | s |
+///
+/// Assumptions: all forces stay as they are (a heavier robot that rubs harder is a friction beside
+/// it), the centre of mass stays over the axle; the inertia is all of it, rotors included; the
+/// change comes once, at the same time in each run.
+///
+/// Reference: I. Newton (1687), second law; M. Basseville, I. V. Nikiforov (1993), "Detection of
+/// Abrupt Changes: Theory and Application", Prentice Hall, chapter 1, a jump of a parameter at an
+/// unknown time.
+#[derive(Clone, Copy, Debug)]
+pub struct PayloadChange;
+
+impl Effect<4, 0> for PayloadChange {
+    const META: EffectMeta = EffectMeta {
+        id: "payload_change",
+        summary: "from an unknown time on mass and inertia are others",
+        symptom: "the model is right up to a moment and wrong from then on: it accelerates too fast (or too slowly) while its final speeds stay right",
+        remedy: "estimate while running, with forgetting; tell the controller when a load is taken up",
+        equation: "rate = nominal/(1 + fraction H(t)), H(t) = (1 + tanh((t - time)/width))/2",
+        reference: "Newton (1687); Basseville, Nikiforov (1993), Detection of Abrupt Changes, chapter 1",
+        example: "[[effect]]\n[effect.payload_change]\nat = [\"inertia.forward\", \"inertia.yaw\"]\nfraction = 0.3\nyaw_fraction = 0.2\ntime = 12.0\n",
+        places: &[PlaceKind::Body],
+        shared_only: true,
+        parameters: &[
+            Parameter::new(
+                "fraction",
+                "δ",
+                "1",
+                "relative growth of the mass, or of the inertia of an axis",
+            )
+            .above(-0.9)
+            .or(0.0)
+            .nonlinear()
+            .scaled(0.2)
+            .on_sides(&[0, 1]),
+            Parameter::new(
+                "yaw_fraction",
+                "δ_ω",
+                "1",
+                "relative growth of the inertia about the vertical",
+            )
+            .above(-0.9)
+            .or(0.0)
+            .nonlinear()
+            .scaled(0.2)
+            .on_sides(&[-1]),
+            Parameter::new("time", "t_0", "s", "when it changes")
+                .within(0.0, f64::INFINITY)
+                .or(0.0)
+                .nonlinear()
+                .scaled(0.5)
+                .starting_within(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]),
+            Parameter::new("width", "s", "s", "how long the change takes")
+                .above(0.0)
+                .or(0.2)
+                .known()
+                .nonlinear()
+                .scaled(0.1),
+        ],
+        ..EffectMeta::PLAIN
+    };
+
+    fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 4]) -> S {
+        let [fraction, yaw_fraction, time, width] = *p;
+        let grown = if at.side < S::zero() {
+            yaw_fraction
+        } else {
+            fraction
+        };
+        let share = S::of(0.5) * (S::one() + ((S::of(at.time) - time) / width).tanh());
+        let growth = grown * share;
+        -at.nominal * growth / (S::one() + growth)
+    }
+}
+
+declare_effect!(PayloadChange, "payload_change", <4, 0>);
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::*;
+
+    use super::*;
+
+    #[test]
+    fn a_heavier_robot_accelerates_less_from_then_on() {
+        let p = [0.25, 0.6, 10.0, 0.2];
+        for (time, side, expected) in [
+            (5.0, 1.0, 2.0),
+            (10.0, 1.0, 2.0 / 1.125),
+            (15.0, 1.0, 1.6),
+            (15.0, 0.0, 1.6),
+            (15.0, -1.0, 1.25),
+        ] {
+            let at = Reading {
+                time,
+                side,
+                nominal: 2.0,
+                ..reading(&[])
+            };
+            let rate: f64 = 2.0 + PayloadChange::contribution(&at, &[], &p);
+            assert!((rate - expected).abs() < 1e-12, "{time} {side}");
+        }
+    }
+}
