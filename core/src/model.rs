@@ -423,7 +423,10 @@ impl Model {
         let (nx, nu) = (x.len(), u.len());
         y[..nx].copy_from_slice(x);
         y[nx..nx + nu].copy_from_slice(u);
-        S::dynamics(self.dynamics).outputs(x, u, p, &mut y[nx + nu..]);
+        let dynamics = S::dynamics(self.dynamics);
+        for (index, output) in y[nx + nu..].iter_mut().enumerate() {
+            *output = dynamics.output(index, x, u, p);
+        }
     }
 
     /// Sensitivity of the measured signals to the plant state (measured × states) at `x`, and

@@ -62,8 +62,8 @@ pub trait Plant<const NX: usize, const NU: usize, const NW: usize, const NP: usi
     /// The rate of the state, in the state's units per second.
     fn derivative<S: Real>(x: &[S; NX], u: &[S; NU], w: &[S; NW], p: &[S; NP]) -> [S; NX];
 
-    /// The outputs, in the order of [`PlantMeta::outputs`].
-    fn outputs<S: Real>(x: &[S; NX], u: &[S; NU], p: &[S; NP]) -> [S; NY];
+    /// The `index`-th of [`PlantMeta::outputs`]; one at a time, since most are not needed.
+    fn output<S: Real>(index: usize, x: &[S; NX], u: &[S; NU], p: &[S; NP]) -> S;
 
     /// Parameters of the equations from those of [`PlantMeta::parameterizations`]`[set]`.
     ///
@@ -95,8 +95,8 @@ pub trait Dynamics<S: Real>: Send + Sync {
     /// One step `h` (s) of the plant alone by [`Rk4`](crate::Rk4), inputs and efforts held: what
     /// that does with [`Dynamics::derivative`], to the last digit, without a call per stage.
     fn step(&self, x: &mut [S], h: S, u: &[S], w: &[S], p: &[S]);
-    /// `y = h(x, u; p)`.
-    fn outputs(&self, x: &[S], u: &[S], p: &[S], y: &mut [S]);
+    /// `h_index(x, u; p)`; zero for slices of other lengths.
+    fn output(&self, index: usize, x: &[S], u: &[S], p: &[S]) -> S;
     /// Parameters of the equations from the values the file gives (set 0 is the equations' own,
     /// set `i` is [`PlantMeta::parameterizations`]`[i - 1]`).
     fn lower(&self, set: usize, from: &[S], p: &mut [S]);
@@ -172,15 +172,11 @@ macro_rules! declare_plant {
                     <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::derivative(x, u, w, p)
                 });
             }
-            fn outputs(&self, x: &[S], u: &[S], p: &[S], y: &mut [S]) {
+            fn output(&self, index: usize, x: &[S], u: &[S], p: &[S]) -> S {
                 let (Ok(x), Ok(u), Ok(p)) = (x.try_into(), u.try_into(), p.try_into()) else {
-                    return;
+                    return S::of(0.0);
                 };
-                let value: [S; $ny] =
-                    <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::outputs(x, u, p);
-                for (to, from) in y.iter_mut().zip(value) {
-                    *to = from;
-                }
+                <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::output(index, x, u, p)
             }
             fn lower(&self, set: usize, from: &[S], p: &mut [S]) {
                 if set == 0 {

@@ -228,7 +228,7 @@ impl Plant<2, 1, 2, 2, 2> for DcAxis {
         [p[0] * x[0] + p[1] * (u[0] + w[0]) + w[1], x[0]]
     }
 
-    fn outputs<S: Real>(x: &[S; 2], u: &[S; 1], p: &[S; 2]) -> [S; 2] {
+    fn output<S: Real>(index: usize, x: &[S; 2], u: &[S; 1], p: &[S; 2]) -> S {
         let [k_a, k_c] = *p;
         // A motor without drive has no back-emf to speak of.
         let armature = if k_c.abs() > S::of(1e-9) {
@@ -236,7 +236,10 @@ impl Plant<2, 1, 2, 2, 2> for DcAxis {
         } else {
             u[0]
         };
-        [armature.abs(), armature]
+        match index {
+            0 => armature.abs(),
+            _ => armature,
+        }
     }
 
     fn lower<S: Real>(set: usize, from: &[S]) -> Option<[S; 2]> {

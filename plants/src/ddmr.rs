@@ -142,28 +142,25 @@ impl Plant<6, 2, 4, 8, 11> for Ddmr {
         ]
     }
 
-    fn outputs<S: Real>(x: &[S; 6], u: &[S; 2], p: &[S; 8]) -> [S; 11] {
+    fn output<S: Real>(index: usize, x: &[S; 6], u: &[S; 2], p: &[S; 8]) -> S {
         let [v, omega, heading, travel, _, _] = *x;
-        let [k_a, _, k_c, k_d, _, k_f, half_track, wheel_radius] = *p;
-        let (right, left) = (v + half_track * omega, v - half_track * omega);
-        let half = S::of(0.5);
-        let forward = half * quotient(k_a, k_c) * v;
-        let turning = half * quotient(k_d, k_f) * omega;
-        let armature_right = u[0] + forward + turning;
-        let armature_left = u[1] + forward - turning;
-        [
-            right / wheel_radius,
-            left / wheel_radius,
-            right,
-            left,
-            (travel + half_track * heading) / wheel_radius,
-            (travel - half_track * heading) / wheel_radius,
-            armature_right.abs() + armature_left.abs(),
-            armature_right,
-            armature_left,
-            omega * omega,
-            -v * omega,
-        ]
+        let [.., half_track, wheel_radius] = *p;
+        match index {
+            0 => (v + half_track * omega) / wheel_radius,
+            1 => (v - half_track * omega) / wheel_radius,
+            2 => v + half_track * omega,
+            3 => v - half_track * omega,
+            4 => (travel + half_track * heading) / wheel_radius,
+            5 => (travel - half_track * heading) / wheel_radius,
+            6 => {
+                let [right, left] = armature(x, u, p);
+                right.abs() + left.abs()
+            }
+            7 => armature(x, u, p)[0],
+            8 => armature(x, u, p)[1],
+            9 => omega * omega,
+            _ => -v * omega,
+        }
     }
 
     fn lower<S: Real>(set: usize, from: &[S]) -> Option<[S; 8]> {
@@ -186,6 +183,16 @@ impl Plant<6, 2, 4, 8, 11> for Ddmr {
         });
         Some([ka, kb, kc, kd, ke, kf, b, r])
     }
+}
+
+/// Voltages over the windings, right and left: what drives less what `K_A` and `K_D` take.
+fn armature<S: Real>(x: &[S; 6], u: &[S; 2], p: &[S; 8]) -> [S; 2] {
+    let [v, omega, ..] = *x;
+    let [k_a, _, k_c, k_d, _, k_f, ..] = *p;
+    let half = S::of(0.5);
+    let forward = half * quotient(k_a, k_c) * v;
+    let turning = half * quotient(k_d, k_f) * omega;
+    [u[0] + forward + turning, u[1] + forward - turning]
 }
 
 /// `a/b`, zero where `b` is: a motor without drive has no back-emf to speak of.
@@ -314,7 +321,7 @@ mod tests {
     #[test]
     fn kinematics_agree_with_the_wheels() {
         let p = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.131, 0.05];
-        let y = Ddmr::outputs(&[0.2, 1.0, 0.0, 0.0, 0.0, 0.0], &[0.0; 2], &p);
+        let y = [0, 1].map(|i| Ddmr::output(i, &[0.2, 1.0, 0.0, 0.0, 0.0, 0.0], &[0.0; 2], &p));
         assert!((0.05 * (y[0] + y[1]) / 2.0 - 0.2f64).abs() < 1e-15);
         assert!((0.05 * (y[0] - y[1]) / (2.0 * 0.131) - 1.0f64).abs() < 1e-14);
     }

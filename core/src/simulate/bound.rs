@@ -91,16 +91,19 @@ impl Bounds {
             && self.outputs.iter().all(|b| b.n_z == 0)
     }
 
-    /// Whether an effect that acts within a step reads a signal beyond the first `states`.
-    pub(super) fn read_beyond(&self, states: usize) -> bool {
+    /// Signals that effects acting within a step read.
+    pub(super) fn read(&self) -> impl Iterator<Item = usize> + '_ {
         self.inputs
             .iter()
             .chain(&self.efforts)
             .chain(&self.bodies)
             .chain(&self.outputs)
-            .any(|b| {
-                b.reads.iter().flatten().any(|i| *i >= states)
-                    || matches!(b.place, Place::Output(i) if i >= states)
+            .flat_map(|b| {
+                let own = match b.place {
+                    Place::Output(i) => Some(i),
+                    _ => None,
+                };
+                b.reads.iter().flatten().copied().chain(own)
             })
     }
 }

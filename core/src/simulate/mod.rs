@@ -38,7 +38,8 @@ pub struct Simulator<'m, S> {
     before: Vec<S>,
     /// What output effects added to angles then, one per output effect.
     added_before: Vec<S>,
-    needs_signals: bool,
+    /// Outputs that are needed at every stage, by index among the outputs.
+    needed: Vec<usize>,
     time: f64,
     interval: f64,
 }
@@ -80,9 +81,17 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                 sensing
             })
             .collect();
-        let quadrature_beyond = sensors
+        let integrated = sensors
             .iter()
-            .any(|s| matches!(s.integral, Integral::State(_)) && s.index >= nx);
+            .filter(|s| matches!(s.integral, Integral::State(_)))
+            .map(|s| s.index);
+        let mut needed: Vec<usize> = bounds
+            .read()
+            .chain(integrated)
+            .filter_map(|i| i.checked_sub(nx + nu))
+            .collect();
+        needed.sort_unstable();
+        needed.dedup();
         // Not cloned from one: a clone of an empty history has no room kept for what is to come.
         let histories = (0..bounds.histories)
             .map(|i| {
@@ -108,7 +117,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             },
             before: vec![S::zero(); sensors.len()],
             added_before: vec![S::zero(); bounds.outputs.len()],
-            needs_signals: bounds.read_beyond(nx) || quadrature_beyond,
+            needed,
             sensors,
             bounds,
             time: 0.0,
@@ -303,7 +312,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             rk4,
             x,
             scratch,
-            needs_signals,
+            needed,
             ..
         } = self;
         let model: &Model = model;
@@ -323,7 +332,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             let nominal = scratch.held[i];
             scratch.held[i] += scene.contribution(bound, nominal, &histories[history]);
         }
-        let nx = model.n_states();
+        let (nx, nu) = (model.n_states(), model.plant.inputs.len());
         let dynamics = S::dynamics(model.dynamics);
         if bounds.idle() && x.len() == nx {
             // Nothing acts on the plant within the step (`w` stays zero): half the time.
@@ -341,10 +350,15 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             let interval = (time, time);
             let plant_x = &x[..nx];
             u.copy_from_slice(held);
-            if bounds.inputs.is_empty() {
-                signals[..nx].copy_from_slice(plant_x);
-            } else {
-                model.signals_at(p, plant_x, u, signals);
+            signals[..nx].copy_from_slice(plant_x);
+            let refresh = |u: &[S], signals: &mut [S]| {
+                signals[nx..nx + nu].copy_from_slice(u);
+                for index in needed.iter() {
+                    signals[nx + nu + index] = dynamics.output(*index, plant_x, u, p);
+                }
+            };
+            refresh(u, signals);
+            if !bounds.inputs.is_empty() {
                 let scene = Scene {
                     model,
                     values,
@@ -361,9 +375,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                     let add = scene.contribution(bound, u[i], &NoPast);
                     u[i] += add;
                 }
-            }
-            if *needs_signals {
-                model.signals_at(p, plant_x, u, signals);
+                refresh(u, signals);
             }
             let scene = Scene {
                 model,
