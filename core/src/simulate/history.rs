@@ -6,6 +6,9 @@ use crate::registry::HostReal;
 /// Instants of the past that are kept per channel with memory.
 const CAPACITY: usize = 4096;
 
+/// Spans below this are too short for a difference of integrals, s.
+const SHORT: f64 = 1e-6;
+
 /// How a signal runs between two instants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Between {
@@ -140,7 +143,7 @@ impl<S: HostReal> History<S> {
 impl<S: HostReal> Past<S> for History<S> {
     fn mean(&self, from: S, to: S) -> S {
         let span = to - from;
-        if span.value() > 0.0 {
+        if span.value() > SHORT {
             (self.at(to).0 - self.at(from).0) / span
         } else {
             // The limit of the mean, with its derivatives by both bounds.

@@ -1,0 +1,351 @@
+//! What every effect owes to those who use it: neutral defaults, influence, exact derivatives, and
+//! a declaration that reads.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use std::collections::BTreeMap;
+
+use loopsight_core::model::{Model, misfit};
+use loopsight_core::registry;
+use loopsight_core::run::Run;
+use loopsight_core::sensor::{Encoder, Sensor};
+use loopsight_core::simulate::{Simulator, free_run};
+use loopsight_core::{Dual, EffectMeta, Place, Real, derivative, unit, variable};
+use loopsight_plants as _;
+
+const DDMR: &str = "[plant.ddmr]\nK_A = -15.146\nK_B = 0.005\nK_C = 0.136\nK_D = -9.573\n\
+                    K_E = -3.945\nK_F = 0.656\nhalf_track = 0.131\nwheel_radius = 0.05\n";
+const AXIS: &str = "[plant.dc_axis]\nK_A = -4.0\nK_C = 3.0\n";
+
+fn model(text: &str) -> Model {
+    Model::from_toml("test.toml", text).unwrap().0
+}
+
+/// Levels that change every 0.25 s, among them pauses, for 10 s.
+fn run(model: &Model) -> Run {
+    let n_inputs = model.plant.inputs.len();
+    let mut state = 12_345u32;
+    let mut level = vec![0.0; n_inputs];
+    let mut run = Run {
+        n_inputs,
+        n_measured: model.measured.len(),
+        ..Run::default()
+    };
+    for k in 0..1000 {
+        if k % 25 == 0 {
+            for u in &mut level {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                *u = f64::from((state >> 24) % 9) * 2.31 - 9.24;
+            }
+        }
+        run.time.push(0.01 * f64::from(k));
+        run.inputs.extend(&level);
+        run.measured.extend(vec![f64::NAN; run.n_measured]);
+    }
+    run
+}
+
+fn simulate<S: registry::HostReal>(model: &Model, values: &[S]) -> Vec<Vec<S>> {
+    let mut simulator = Simulator::new(model, values);
+    let mut all = Vec::new();
+    let x0 = vec![S::zero(); model.n_states()];
+    free_run(&mut simulator, &x0, &run(model), |_, y| {
+        all.push(y.to_vec())
+    });
+    all
+}
+
+/// The largest difference of two simulations, by signal, relative to the size of the second.
+fn difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    let signals = a[0].len();
+    (0..signals)
+        .map(|i| {
+            let largest = b.iter().fold(0.0f64, |m, y| m.max(y[i].abs()));
+            let off = a
+                .iter()
+                .zip(b)
+                .fold(0.0f64, |m, (a, b)| m.max((a[i] - b[i]).abs()));
+            off / largest.max(1e-12)
+        })
+        .fold(0.0, f64::max)
+}
+
+/// The channels an effect fits: singly, or by family where it acts on all of them only.
+fn channel_sets(model: &Model, meta: &EffectMeta) -> Vec<Vec<&'static str>> {
+    let fitting = model
+        .plant
+        .channels
+        .iter()
+        .filter(|c| misfit(c, meta).is_none());
+    if !meta.shared_only {
+        return fitting.map(|c| vec![c.id]).collect();
+    }
+    let mut families: BTreeMap<&str, Vec<&'static str>> = BTreeMap::new();
+    for channel in fitting {
+        let family = channel.id.split('.').next().unwrap();
+        families.entry(family).or_default().push(channel.id);
+    }
+    families.into_values().collect()
+}
+
+/// What is measured to see an effect at these channels: a few ways of measuring.
+fn sensors(model: &Model, at: &[&str]) -> Vec<Vec<(String, Sensor)>> {
+    let signals: Vec<&str> = loopsight_core::model::signals(model.plant)
+        .map(|s| s.id)
+        .collect();
+    let outputs: Vec<usize> = model
+        .plant
+        .channels
+        .iter()
+        .filter(|c| at.contains(&c.id))
+        .filter_map(|c| match c.place {
+            Place::Output(i) => Some(i),
+            _ => None,
+        })
+        .collect();
+    if outputs.is_empty() {
+        let with = |sensor: Sensor| {
+            model
+                .plant
+                .controlled
+                .iter()
+                .map(move |i| (*i, sensor.clone()))
+        };
+        return vec![
+            with(Sensor::IntervalMean)
+                .map(|(i, s)| (signals[i].to_owned(), s))
+                .collect(),
+        ];
+    }
+    [Sensor::Instantaneous, Sensor::IntervalMean]
+        .iter()
+        .map(|sensor| {
+            outputs
+                .iter()
+                .map(|i| (signals[*i].to_owned(), sensor.clone()))
+                .collect()
+        })
+        .collect()
+}
+
+/// Every effect at all channels where it fits, with what is measured.
+fn each_case(mut check: impl FnMut(&str, Model, std::ops::Range<usize>, &[Vec<f64>])) {
+    for text in [DDMR, AXIS] {
+        let plain = model(text);
+        for meta in registry::effects() {
+            for at in channel_sets(&plain, meta) {
+                for measured in sensors(&plain, &at) {
+                    let mut plain = plain.clone();
+                    plain.measure(&measured).unwrap();
+                    let with = plain.with_effect(meta.id, &at).unwrap();
+                    let own = plain.parameters.len()..with.parameters.len();
+                    let name = format!("{} at {at:?}, {}", meta.id, measured[0].1.name());
+                    let nominal = simulate(&plain, &plain.values());
+                    check(&name, with, own, &nominal);
+                }
+            }
+        }
+    }
+}
+
+/// Values off neutral: those of the declaration's scale, or a start.
+fn noticeable(model: &Model, own: std::ops::Range<usize>) -> Vec<f64> {
+    let mut values = model.values();
+    for i in own {
+        let parameter = &model.parameters[i];
+        if parameter.free {
+            let starts = parameter.starts(10.0);
+            values[i] = match starts.get(1.min(starts.len().saturating_sub(1))) {
+                Some(start) => 0.97 * start,
+                None => values[i] + 0.73 * parameter.scale(),
+            };
+            assert!(
+                parameter.declaration.admits(values[i]),
+                "{}",
+                parameter.name
+            );
+        }
+    }
+    values
+}
+
+fn derivatives(model: &Model, values: &[f64], by: usize) -> Vec<Vec<f64>> {
+    let mut dual: Vec<Dual> = values.iter().map(|v| Dual::of(*v)).collect();
+    dual[by] = variable(values[by], 0);
+    simulate(model, &dual)
+        .iter()
+        .map(|y| y.iter().map(|v| derivative(v, 0)).collect())
+        .collect()
+}
+
+#[test]
+fn every_effect_fits_somewhere_and_its_declaration_reads() {
+    let mut cases: BTreeMap<&str, usize> = BTreeMap::new();
+    for text in [DDMR, AXIS] {
+        let plain = model(text);
+        for meta in registry::effects() {
+            for at in channel_sets(&plain, meta) {
+                *cases.entry(meta.id).or_default() += 1;
+                let with = plain.with_effect(meta.id, &at).unwrap();
+                for parameter in &with.parameters {
+                    unit::parse(&parameter.unit).unwrap_or_else(|e| {
+                        panic!("{}: {}: {e:?}", parameter.name, parameter.unit)
+                    });
+                }
+            }
+        }
+    }
+    for meta in registry::effects() {
+        assert!(cases.contains_key(meta.id), "{} fits nowhere", meta.id);
+        for text in [
+            meta.summary,
+            meta.symptom,
+            meta.remedy,
+            meta.equation,
+            meta.reference,
+        ] {
+            assert!(!text.is_empty(), "{}", meta.id);
+        }
+        for simpler in meta.simpler {
+            assert!(
+                registry::effects().iter().any(|m| m.id == *simpler),
+                "{simpler}"
+            );
+        }
+        let reads = [DDMR, AXIS].iter().any(|plant| {
+            Model::from_toml("test.toml", &format!("{plant}{}", meta.example)).is_ok()
+        });
+        assert!(reads, "the example of {} does not read", meta.id);
+    }
+}
+
+#[test]
+fn defaults_change_nothing() {
+    each_case(|name, with, _, nominal| {
+        let off = difference(&simulate(&with, &with.values()), nominal);
+        assert!(off < 1e-9, "{name}: {off}");
+    });
+}
+
+#[test]
+fn scales_are_noticed_and_every_parameter_has_its_exact_derivative() {
+    each_case(|name, with, own, nominal| {
+        let values = noticeable(&with, own.clone());
+        let off = difference(&simulate(&with, &values), nominal);
+        // An offset of an angle does not show in its rate.
+        assert!(
+            off > 1e-4 || name.starts_with("sensor_offset"),
+            "{name}: {off}"
+        );
+        assert!(off < 3.0, "{name}: {off}");
+        for i in own.filter(|i| with.parameters[*i].free) {
+            let parameter = &with.parameters[i];
+            let exact = derivatives(&with, &values, i);
+            let step = 1e-5 * parameter.scale();
+            let at = |h: f64| {
+                let mut values = values.clone();
+                values[i] += h;
+                simulate(&with, &values)
+            };
+            let numeric: Vec<Vec<f64>> = at(step)
+                .iter()
+                .zip(at(-step))
+                .map(|(a, b)| {
+                    a.iter()
+                        .zip(b)
+                        .map(|(a, b)| (a - b) / (2.0 * step))
+                        .collect()
+                })
+                .collect();
+            let largest = exact.iter().flatten().fold(0.0f64, |m, d| m.max(d.abs()));
+            assert!(largest > 0.0, "{name}: {} has no influence", parameter.name);
+            let worst = exact
+                .iter()
+                .flatten()
+                .zip(numeric.iter().flatten())
+                .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+            assert!(
+                worst < 1e-5 * largest,
+                "{name}: {}: {}",
+                parameter.name,
+                worst / largest
+            );
+        }
+    });
+}
+
+/// Where a fit starts from neutral, it must see which way to go.
+#[test]
+fn a_fit_can_leave_the_defaults() {
+    each_case(|name, with, own, nominal| {
+        for i in own {
+            let parameter = &with.parameters[i];
+            if !parameter.free || !parameter.declaration.starts.is_empty() {
+                continue;
+            }
+            let values = with.values();
+            let exact = derivatives(&with, &values, i);
+            let step = 1e-5 * parameter.scale();
+            let mut moved = values.clone();
+            moved[i] += step;
+            let moved = simulate(&with, &moved);
+            let largest = exact.iter().flatten().fold(0.0f64, |m, d| m.max(d.abs()));
+            let worst = exact
+                .iter()
+                .flatten()
+                .zip(moved.iter().flatten().zip(nominal.iter().flatten()))
+                .fold(0.0f64, |m, (d, (a, b))| m.max((d - (a - b) / step).abs()));
+            assert!(largest > 0.0, "{name}: {}", parameter.name);
+            assert!(
+                worst < 1e-3 * largest,
+                "{name}: {}: {}",
+                parameter.name,
+                worst / largest
+            );
+        }
+    });
+}
+
+/// What is added to an encoder's angle acts on the speeds that are made from its counts.
+#[test]
+fn effects_on_encoders_reach_the_speeds_behind_them() {
+    let mut plain = model(DDMR);
+    let encoder = |left: f64| {
+        Sensor::EncoderCounts(Encoder {
+            counts_per_revolution: 8192.0,
+            of: [
+                ("shaft_angle_right".to_owned(), 0.025),
+                ("shaft_angle_left".to_owned(), left),
+            ]
+            .into(),
+        })
+    };
+    plain
+        .measure(&[
+            ("linear_velocity".to_owned(), encoder(0.025)),
+            ("angular_velocity".to_owned(), encoder(-0.025)),
+        ])
+        .unwrap();
+    let nominal = simulate(&plain, &plain.values());
+    for (id, at) in [
+        (
+            "wheel_radius_mismatch",
+            vec!["encoder.right", "encoder.left"],
+        ),
+        ("encoder_ripple", vec!["encoder.left"]),
+        ("sensor_lag", vec!["encoder.left"]),
+        ("sensor_scale", vec!["encoder.right"]),
+    ] {
+        let with = plain.with_effect(id, &at).unwrap();
+        let own = plain.parameters.len()..with.parameters.len();
+        assert!(
+            difference(&simulate(&with, &with.values()), &nominal) < 1e-9,
+            "{id}"
+        );
+        let values = noticeable(&with, own);
+        assert!(
+            difference(&simulate(&with, &values), &nominal) > 1e-3,
+            "{id}"
+        );
+    }
+}
