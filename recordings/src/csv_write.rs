@@ -139,6 +139,7 @@ pub struct LogWriter {
     target: PathBuf,
     part: PathBuf,
     out: BufWriter<File>,
+    row: Vec<u8>,
     columns: usize,
     flushed: Option<f64>,
 }
@@ -159,6 +160,7 @@ impl LogWriter {
             target: path.to_owned(),
             part,
             out,
+            row: Vec::new(),
             columns: headers.len(),
             flushed: None,
         })
@@ -182,7 +184,11 @@ impl LogWriter {
                 found: row.len(),
             });
         }
-        write_row(&mut self.out, row).map_err(|e| io(&self.part, "write", &e))?;
+        // In one piece, so that the buffer breaks between rows: a killed run leaves whole ones.
+        self.row.clear();
+        write_row(&mut self.row, row)
+            .and_then(|()| self.out.write_all(&self.row))
+            .map_err(|e| io(&self.part, "write", &e))?;
         let time = row.first().copied().unwrap_or(f64::NAN);
         match self.flushed {
             None => self.flushed = Some(time),
@@ -299,6 +305,22 @@ mod tests {
             panic!("a table")
         };
         assert_eq!(table.runs[0].rows.len(), 500);
+    }
+
+    /// Also when the buffer is full before it is time to flush.
+    #[test]
+    fn a_part_ends_with_a_whole_row() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        let mut log = LogWriter::create(&path, &names(&["time_s", "u_V"])).unwrap();
+        for k in 0..5000 {
+            let sample = f64::from(k);
+            log.write(&[sample * 1e-4 + 1e-12, sample.sqrt()]).unwrap();
+            if k % 97 == 0 {
+                let text = std::fs::read_to_string(log.part_path()).unwrap();
+                assert!(text.ends_with('\n'), "after row {k}");
+            }
+        }
     }
 
     #[test]

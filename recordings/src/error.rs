@@ -219,7 +219,7 @@ pub enum RecordingError {
     },
     /// A magnitude no control loop has.
     #[error(
-        "{log}: {at}: the value {value} is absurd: its magnitude is above {limit:e} in SI units"
+        "{log}: {at}: the value {value} is absurd: its magnitude is {limit:e} or more in SI units"
     )]
     AbsurdValue {
         /// The file.

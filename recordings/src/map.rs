@@ -14,7 +14,7 @@ use crate::segment::{Segments, segment};
 use crate::source::Source;
 use crate::table::{Table, TableRun};
 
-/// Values above this magnitude, in SI units, are no measurements.
+/// Values of this magnitude or more, in SI units, are no measurements.
 pub(crate) const ABSURD: f64 = 1e9;
 /// Runs shorter than this, s, are left out.
 pub(crate) const SHORT_RUN: f64 = 1.0;
@@ -279,7 +279,7 @@ impl<'a> Mapper<'a> {
             let place = || self.table.location(run, at, link.column).to_string();
             if value.is_nan() {
                 self.missing[signal].add(place);
-            } else if value.abs() > ABSURD {
+            } else if value.abs() >= ABSURD {
                 self.absurd[signal].add(|| format!("{}: {value}", place()));
                 value = f64::NAN;
             }
@@ -315,7 +315,7 @@ impl<'a> Mapper<'a> {
         value: f64,
     ) -> Result<(), RecordingError> {
         // A NaN here is the difference of two infinite time stamps.
-        if value.is_nan() || value.abs() > ABSURD {
+        if value.is_nan() || value.abs() >= ABSURD {
             return Err(RecordingError::AbsurdValue {
                 log: self.table.source.as_str().into(),
                 at: Box::new(self.table.location(run, at, link.column)),
@@ -396,7 +396,7 @@ impl<'a> Mapper<'a> {
             }
             if absurd.count > 0 {
                 let detail = format!(
-                    "{} of {} samples are above {ABSURD:e} {} in magnitude and count as \
+                    "{} of {} samples are {ABSURD:e} {} or more in magnitude and count as \
                      missing, the first at {}",
                     absurd.count, self.rows, signal.unit, absurd.first
                 );
