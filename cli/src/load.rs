@@ -83,6 +83,19 @@ fn mapped(
     path: &Path,
 ) -> Result<(Vec<Run>, Vec<Fault>), Failure> {
     let recording = map(model, log).map_err(|e| failure::recording(path, &e))?;
+    for (i, signal) in recording.measured.iter().enumerate() {
+        let mut samples = recording
+            .runs
+            .iter()
+            .flat_map(|run| (0..run.len()).map(move |k| run.sample(k)[i]));
+        if !samples.any(f64::is_finite) {
+            return Err(Failure::request(format!(
+                "{}: `{}` has no sample: every value of its column is missing or absurd",
+                path.display(),
+                signal.id
+            )));
+        }
+    }
     let measured: Vec<_> = recording
         .measured
         .iter()
@@ -131,23 +144,39 @@ pub(crate) fn refuse_fatal(path: &Path, faults: &[Fault]) -> Result<(), Failure>
 
 /// Writes a text file through a temporary name in the same folder.
 pub(crate) fn save_text(path: &Path, text: &str) -> Result<(), Failure> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let wrong = |why: String| Failure::request(format!("cannot write {}: {why}", path.display()));
-    if path.is_dir() {
-        return Err(wrong("it is a directory, expected a file".to_owned()));
-    }
-    if !folder.is_dir() {
-        return Err(wrong(format!("there is no directory {}", folder.display())));
-    }
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|e| wrong(e.to_string()))?;
-    std::io::Write::write_all(&mut file, text.as_bytes()).map_err(|e| wrong(e.to_string()))?;
+    let mut file = beside(path)?;
+    let wrong = |why: std::io::Error| cannot_write(path, &why.to_string());
+    std::io::Write::write_all(&mut file, text.as_bytes()).map_err(wrong)?;
     make_readable(&file);
-    file.persist(path).map_err(|e| wrong(e.error.to_string()))?;
+    file.persist(path).map_err(|e| wrong(e.error))?;
     output::note(&format!("wrote {}", path.display()));
     Ok(())
+}
+
+/// Refuses a place that cannot be written before the work whose result it is for.
+pub(crate) fn writable(path: &Path) -> Result<(), Failure> {
+    beside(path).map(drop)
+}
+
+/// A temporary file in the folder of `path`, to become it.
+fn beside(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
+    if path.is_dir() {
+        return Err(cannot_write(path, "it is a directory, expected a file"));
+    }
+    let folder = match (path.parent(), path.file_name()) {
+        (Some(parent), Some(_)) if !parent.as_os_str().is_empty() => parent,
+        (Some(_), Some(_)) => Path::new("."),
+        _ => return Err(cannot_write(path, "expected the name of a file")),
+    };
+    if !folder.is_dir() {
+        let why = format!("there is no directory {}", folder.display());
+        return Err(cannot_write(path, &why));
+    }
+    tempfile::NamedTempFile::new_in(folder).map_err(|e| cannot_write(path, &e.to_string()))
+}
+
+fn cannot_write(path: &Path, why: &str) -> Failure {
+    Failure::request(format!("cannot write `{}`: {why}", path.display()))
 }
 
 /// Temporary files are private; a result is not.

@@ -172,8 +172,9 @@ pub(crate) fn fit(fit: &Fit) -> String {
 
 /// The command as it was typed, for the foot of a page.
 pub(crate) fn command_line() -> String {
-    let words: Vec<String> = std::env::args()
+    let words: Vec<String> = std::env::args_os()
         .skip(1)
+        .map(|w| w.to_string_lossy().into_owned())
         .map(|w| if w.contains(' ') { format!("'{w}'") } else { w })
         .collect();
     format!("loopsight {}", words.join(" "))

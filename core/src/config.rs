@@ -115,6 +115,7 @@ impl Source {
 
     /// Reads the whole document as a `T`.
     pub fn read<T: DeserializeOwned>(&self) -> Result<T, Box<ConfigError>> {
+        self.one_part_each()?;
         let deserializer = match toml::Deserializer::parse(&self.text) {
             Ok(deserializer) => deserializer,
             Err(error) => {
@@ -141,8 +142,33 @@ impl Source {
                     serde_path_to_error::Segment::Unknown => None,
                 })
                 .collect();
-            self.explain(path, error.inner().message())
+            // Lines after the first repeat the path.
+            let message = error.inner().message().lines().next();
+            self.explain(path, message.unwrap_or(""))
         })
+    }
+
+    /// Of two parts in one table typetag would take the first and drop the other without a word.
+    fn one_part_each(&self) -> Result<(), Box<ConfigError>> {
+        let table = self.document.as_table();
+        let roles = ["plant", "driver", "controller", "estimator"].map(|role| {
+            let part = table.get(role).and_then(Item::as_table_like);
+            (vec![Step::from(role)], part)
+        });
+        let effects = table.get("effect").and_then(Item::as_array_of_tables);
+        let effects = effects.into_iter().flatten().enumerate().map(|(i, t)| {
+            let part: &dyn toml_edit::TableLike = t;
+            (vec!["effect".into(), i.into()], Some(part))
+        });
+        for (mut path, part) in roles.into_iter().chain(effects) {
+            let mut keys = part.into_iter().flat_map(|t| t.iter());
+            if let (Some((first, _)), Some((second, _))) = (keys.next(), keys.next()) {
+                let message = format!("`{second}` stands beside `{first}`, expected one of them");
+                path.push(second.into());
+                return Err(self.error(&path, &message, None));
+            }
+        }
+        Ok(())
     }
 
     /// An error at `path`; the deepest part of it that the document has is pointed at.
@@ -398,14 +424,17 @@ fn nearest_text(found: &str, expected: &[String]) -> Option<String> {
     nearest(found, expected.iter().map(String::as_str)).map(|n| format!("did you mean `{n}`?"))
 }
 
-/// The candidate most like `found`, if any is like it at all (Jaro–Winkler above 0.7, case
-/// ignored).
+/// The candidate most like `found`, if any is (Jaro–Winkler above 0.7, or few letters changed).
 pub fn nearest<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let found = found.to_lowercase();
     candidates
         .into_iter()
-        .map(|c| (strsim::jaro_winkler(&found, &c.to_lowercase()), c))
-        .filter(|(likeness, _)| *likeness > 0.7)
+        .filter_map(|c| {
+            let name = c.to_lowercase();
+            let alike = strsim::jaro_winkler(&found, &name);
+            let edits = strsim::normalized_damerau_levenshtein(&found, &name);
+            (alike > 0.7 || edits > 0.6).then_some((alike.max(edits), c))
+        })
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, c)| c)
 }
@@ -465,5 +494,6 @@ mod tests {
     fn unlike_names_are_not_suggested() {
         assert_eq!(nearest("qqqq", ["mass", "inertia"]), None);
         assert_eq!(nearest("K_a", ["K_A", "K_B"]), Some("K_A"));
+        assert_eq!(nearest("fti", ["log", "fit"]), Some("fit"));
     }
 }

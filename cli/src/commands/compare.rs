@@ -6,10 +6,11 @@ use loopsight_report::{Context, comparison_page, save};
 use crate::arguments::CompareOptions;
 use crate::commands::fit::watch;
 use crate::failure::Failure;
-use crate::load::{model_and_log, refuse_fatal};
+use crate::load::{model_and_log, refuse_fatal, writable};
 use crate::output;
 
 pub(crate) fn run(options: &CompareOptions) -> Result<(), Failure> {
+    options.html.as_deref().map_or(Ok(()), writable)?;
     let loaded = model_and_log(&options.files)?;
     let mut notes = Vec::new();
     let comparison = if loaded.model_path.is_none() {

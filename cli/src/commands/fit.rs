@@ -7,10 +7,13 @@ use loopsight_report::{Context, fit_page, save};
 
 use crate::arguments::{FitOptions, MethodName, SchemeName};
 use crate::failure::Failure;
-use crate::load::{Loaded, model_and_log, recording, refuse_fatal, save_text};
+use crate::load::{Loaded, model_and_log, recording, refuse_fatal, save_text, writable};
 use crate::{output, progress};
 
 pub(crate) fn run(options: &FitOptions) -> Result<(), Failure> {
+    for path in options.output.iter().chain(&options.html) {
+        writable(path)?;
+    }
     let loaded = model_and_log(&options.files)?;
     refuse_fatal(&loaded.log_path, &loaded.faults)?;
     let mut faults = loaded.faults.clone();

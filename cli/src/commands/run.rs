@@ -53,6 +53,9 @@ pub(crate) fn run(options: &RunOptions) -> Result<(), Failure> {
         .output
         .clone()
         .or_else(|| file.log.as_ref().map(|l| beside(&options.file, l)));
+    for path in log_path.iter().chain(&options.html) {
+        load::writable(path)?;
+    }
     let mut recorder = Recorder::new(&model, &composed, file.period_s, file.duration_s);
     let mut log = match &log_path {
         None => None,
@@ -128,6 +131,9 @@ fn promise(file: &LoopFile, record: &mut LoopRecord) {
     }
 }
 
+/// Most ticks of one run: beyond it a number was mistyped.
+const MOST_TICKS: f64 = 1e7;
+
 /// A path in a loop file is relative to that file.
 fn beside(file: &Path, path: &str) -> PathBuf {
     file.parent()
@@ -140,6 +146,12 @@ pub(crate) fn compose(
     source: &Source,
     file: &LoopFile,
 ) -> Result<(Model, Composed), Failure> {
+    // Each tick is kept for the page and the summary, so this bounds memory, too.
+    let ticks = file.duration_s.map_or(0.0, |d| d / file.period_s);
+    if file.period_s > 0.0 && ticks > MOST_TICKS {
+        let message = format!("that is {ticks:.1e} ticks, expected at most {MOST_TICKS:e}");
+        return Err(source.error(&["duration_s".into()], &message, None).into());
+    }
     let model_path = beside(path, &file.model);
     if !model_path.exists() {
         let message = format!("there is no model file {}", model_path.display());

@@ -14,6 +14,7 @@ use serde::Deserialize;
 
 use crate::arguments::SimulateOptions;
 use crate::failure::{self, Failure};
+use crate::load::writable;
 use crate::output;
 
 /// An experiment file: what a robot is driven with and how it is measured.
@@ -73,6 +74,7 @@ impl Experiment {
 }
 
 pub(crate) fn run(options: &SimulateOptions) -> Result<(), Failure> {
+    writable(&options.output)?;
     let (model, _) = Model::load(&options.model)?;
     let missing = model.missing_values();
     if !missing.is_empty() {
