@@ -1,1 +1,120 @@
-//! placeholder
+//! What the cross-crate tests share: the robot of the paper, recordings of it, and the command as a
+//! user has it.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "what is built here is right, and a panic is how a test fails"
+)]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use loopsight_controllers as _;
+use loopsight_core::excitation::{Excitation, build, sample_rows};
+use loopsight_core::model::Model;
+use loopsight_core::run::Run;
+use loopsight_core::sensor::Sensor;
+use loopsight_drivers::{Simulated, simulate_inputs};
+use loopsight_estimators as _;
+use loopsight_plants as _;
+
+/// The top folder of the repository.
+pub fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap()
+        .to_owned()
+}
+
+/// The model file of the Twil, with its encoders.
+pub fn twil_path() -> PathBuf {
+    repository().join("examples/twil/model.toml")
+}
+
+/// The Twil with the paper's parameters; its velocities come from encoder counts.
+pub fn twil() -> Model {
+    Model::load(&twil_path()).unwrap().0
+}
+
+/// `model` with the same measured signals, all made by `sensor`.
+pub fn measured_by(mut model: Model, sensor: &Sensor) -> Model {
+    let list: Vec<(String, Sensor)> = model
+        .measured
+        .iter()
+        .map(|m| (m.signal.id.to_owned(), sensor.clone()))
+        .collect();
+    model.measure(&list).unwrap();
+    model
+}
+
+/// `model` without the values that a fit is to find.
+pub fn unknown(mut model: Model) -> Model {
+    for parameter in model.parameters.iter_mut().filter(|p| p.free) {
+        parameter.value = None;
+    }
+    model
+}
+
+/// Sampling period of the paper, s.
+pub const PERIOD: f64 = 0.01;
+
+/// `0, T, 2 T, …, seconds`.
+pub fn instants(seconds: f64) -> Vec<f64> {
+    let last = (seconds / PERIOD).round() as usize;
+    (0..=last).map(|k| k as f64 * PERIOD).collect()
+}
+
+/// Pseudo-random binary inputs of ±`amplitude`, drawn anew every 0.5 s, one row per instant.
+pub fn prbs(model: &Model, amplitude: f64, seed: u64, time: &[f64]) -> Vec<f64> {
+    let given: BTreeMap<String, Excitation> = model
+        .plant
+        .inputs
+        .iter()
+        .map(|input| {
+            let prbs = Excitation::Prbs {
+                amplitude,
+                hold_s: 0.5,
+                seed,
+                common: false,
+            };
+            (input.id.to_owned(), prbs)
+        })
+        .collect();
+    sample_rows(&build(&given, model.plant.inputs).unwrap(), time)
+}
+
+/// 25 s of the paper's experiment on `model`: ±9 V, 100 Hz. With `quantize`, encoders count.
+pub fn recording(model: &Model, seed: u64, quantize: bool) -> Run {
+    let settings = Simulated {
+        seed,
+        quantize,
+        ..Simulated::default()
+    };
+    let time = instants(25.0);
+    simulate_inputs(model, &settings, &time, &prbs(model, 9.0, seed, &time)).unwrap()
+}
+
+/// A random stream that needs no crate: xorshift64*, seeded.
+#[derive(Clone, Debug)]
+pub struct Random(u64);
+
+impl Random {
+    /// The stream of `seed`.
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
+    }
+
+    /// 64 bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    /// A whole number below `end`, which is above 0.
+    pub fn below(&mut self, end: usize) -> usize {
+        ((self.bits() >> 33) as usize) % end
+    }
+}

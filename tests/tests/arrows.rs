@@ -1,0 +1,218 @@
+//! Who may look into whom, and the rules of the house that a program can check.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "a workspace that cannot be read is how this program fails"
+)]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use cargo_metadata::{DependencyKind, Edition, Metadata, MetadataCommand};
+use loopsight_tests::repository;
+
+/// Each room, and the rooms it may depend on. Siblings do not stand in each other's line.
+const ARROWS: [(&str, &[&str]); 10] = [
+    ("core", &[]),
+    ("plants", &["core"]),
+    ("estimators", &["core"]),
+    ("controllers", &["core"]),
+    ("drivers", &["core"]),
+    ("recordings", &["core"]),
+    ("diagnosis", &["core", "recordings"]),
+    ("report", &["core", "recordings", "diagnosis"]),
+    (
+        "cli",
+        &[
+            "core",
+            "plants",
+            "estimators",
+            "controllers",
+            "drivers",
+            "recordings",
+            "diagnosis",
+            "report",
+        ],
+    ),
+    (
+        "tests",
+        &[
+            "core",
+            "plants",
+            "estimators",
+            "controllers",
+            "drivers",
+            "recordings",
+            "diagnosis",
+            "report",
+            "cli",
+        ],
+    ),
+];
+
+/// Lines of a file from which on it must be split.
+const LONGEST: usize = 500;
+
+fn metadata() -> Metadata {
+    MetadataCommand::new()
+        .manifest_path(repository().join("Cargo.toml"))
+        .no_deps()
+        .exec()
+        .unwrap()
+}
+
+fn room(package: &str) -> Option<&str> {
+    package.strip_prefix("loopsight-")
+}
+
+/// The rooms each room depends on, by kind of dependency.
+fn rooms(kind: DependencyKind) -> BTreeMap<String, BTreeSet<String>> {
+    metadata()
+        .packages
+        .iter()
+        .map(|package| {
+            let name = room(&package.name).unwrap_or(&package.name).to_owned();
+            let on = package
+                .dependencies
+                .iter()
+                .filter(|d| d.kind == kind)
+                .filter_map(|d| room(&d.name))
+                .map(str::to_owned)
+                .collect();
+            (name, on)
+        })
+        .collect()
+}
+
+#[test]
+fn every_room_is_known() {
+    let known: BTreeSet<String> = ARROWS.iter().map(|(name, _)| (*name).to_owned()).collect();
+    let found: BTreeSet<String> = rooms(DependencyKind::Normal).into_keys().collect();
+    assert_eq!(found, known);
+}
+
+#[test]
+fn arrows_run_one_way() {
+    for kind in [DependencyKind::Normal, DependencyKind::Build] {
+        for (name, on) in rooms(kind) {
+            let (_, allowed) = ARROWS.iter().find(|(n, _)| *n == name).unwrap();
+            for other in on {
+                assert!(
+                    allowed.contains(&other.as_str()),
+                    "{name} depends on {other}, expected at most {allowed:?}"
+                );
+            }
+        }
+    }
+}
+
+/// A crate may test itself with the help of others, as long as none of them is built on it.
+#[test]
+fn tests_make_no_circles() {
+    let normal = rooms(DependencyKind::Normal);
+    for (name, on) in rooms(DependencyKind::Development) {
+        for other in on {
+            let mut below: BTreeSet<&str> = BTreeSet::new();
+            let mut open = vec![other.as_str()];
+            while let Some(next) = open.pop() {
+                if below.insert(next) {
+                    open.extend(normal[next].iter().map(String::as_str));
+                }
+            }
+            assert!(
+                !below.contains(name.as_str()),
+                "{name} is tested with {other}, which is built on {name}"
+            );
+        }
+    }
+}
+
+#[test]
+fn every_crate_keeps_the_rules_of_the_workspace() {
+    let read = |path: &Path| -> toml::Table {
+        std::fs::read_to_string(path)
+            .unwrap()
+            .parse::<toml::Table>()
+            .unwrap()
+    };
+    let workspace = read(&repository().join("Cargo.toml"));
+    assert_eq!(
+        workspace["workspace"]["lints"]["rust"]["unsafe_code"].as_str(),
+        Some("forbid")
+    );
+    for package in metadata().packages {
+        let manifest = read(package.manifest_path.as_std_path());
+        let lints = manifest.get("lints").and_then(|l| l.get("workspace"));
+        assert_eq!(
+            lints.and_then(toml::Value::as_bool),
+            Some(true),
+            "{}: `lints.workspace = true` is missing",
+            package.name
+        );
+        assert_eq!(package.edition, Edition::E2024, "{}", package.name);
+    }
+}
+
+/// The Rust files of the repository, as it is checked out.
+fn sources() -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![repository()];
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if name.starts_with('.') || name == "target" {
+                continue;
+            }
+            if path.is_dir() {
+                open.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                found.push(path);
+            }
+        }
+    }
+    assert!(found.len() > 50, "{} files", found.len());
+    found
+}
+
+#[test]
+fn no_file_is_too_long() {
+    let long: Vec<String> = sources()
+        .iter()
+        .map(|path| {
+            let lines = std::fs::read_to_string(path).unwrap().lines().count();
+            (path, lines)
+        })
+        .filter(|(_, lines)| *lines >= LONGEST)
+        .map(|(path, lines)| format!("{}: {lines} lines", path.display()))
+        .collect();
+    assert!(
+        long.is_empty(),
+        "files of {LONGEST} lines or more:\n{}",
+        long.join("\n")
+    );
+}
+
+#[test]
+fn nothing_is_left_undone() {
+    // In two halves, so that this file does not find itself.
+    let words = [
+        concat!("to", "do!("),
+        concat!("unimple", "mented!("),
+        concat!("db", "g!("),
+    ];
+    for path in sources() {
+        let text = std::fs::read_to_string(&path).unwrap();
+        for (number, line) in text.lines().enumerate() {
+            let code = line.split("//").next().unwrap_or("");
+            for word in words {
+                assert!(
+                    !code.contains(word),
+                    "{}:{}: {word}",
+                    path.display(),
+                    number + 1
+                );
+            }
+        }
+    }
+}
