@@ -17,6 +17,8 @@ mod channel;
 mod clock;
 mod controller;
 mod driver;
+#[cfg(feature = "std")]
+mod dual;
 mod effect;
 mod estimator;
 mod integrator;
@@ -60,6 +62,8 @@ pub use clock::SystemClock;
 pub use clock::{Clock, SimulatedClock};
 pub use controller::{AffineModel, Command, ControlError, Controller};
 pub use driver::{Driver, DriverError, DriverFault, Sample};
+#[cfg(feature = "std")]
+pub use dual::{DUAL_WIDTH, Dual, derivative, variable};
 pub use effect::{Effect, EffectMeta, NoPast, Past, Physics, Reading};
 pub use estimator::{Estimator, Innovation};
 pub use integrator::{Rk4, rk4_step, substeps};
@@ -68,8 +72,6 @@ pub use parameter::Parameter;
 pub use plant::check_sizes as plant_check;
 pub use plant::{ControlAffine, Dynamics, Parameterization, Plant, PlantMeta};
 pub use real::Real;
-#[cfg(feature = "std")]
-pub use real::{DUAL_WIDTH, Dual, derivative, variable};
 pub use signal::Signal;
 pub use tick::{Loop, Observer, Step, Tick, TickError};
 

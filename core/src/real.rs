@@ -125,55 +125,10 @@ impl Real for f64 {
     }
 }
 
-/// Number of derivatives one [`Dual`] carries; a fit with more parameters makes several passes.
-#[cfg(feature = "std")]
-pub const DUAL_WIDTH: usize = 8;
-
-/// A value with its derivatives by [`DUAL_WIDTH`] quantities at once (forward mode, num-dual).
-#[cfg(feature = "std")]
-pub type Dual = num_dual::DualSVec64<DUAL_WIDTH>;
-
-#[cfg(feature = "std")]
-impl Real for Dual {
-    fn of(value: f64) -> Self {
-        Self::from_re(value)
-    }
-    fn value(self) -> f64 {
-        self.re
-    }
-    fn sin(self) -> Self {
-        num_dual::DualNum::sin(&self)
-    }
-    fn cos(self) -> Self {
-        num_dual::DualNum::cos(&self)
-    }
-    fn tanh(self) -> Self {
-        num_dual::DualNum::tanh(&self)
-    }
-    fn exp(self) -> Self {
-        num_dual::DualNum::exp(&self)
-    }
-    fn sqrt(self) -> Self {
-        num_dual::DualNum::sqrt(&self)
-    }
-}
-
-/// The quantity `value`, differentiated by itself: its `index`-th derivative is one.
-#[cfg(feature = "std")]
-pub fn variable(value: f64, index: usize) -> Dual {
-    debug_assert!(index < DUAL_WIDTH);
-    Dual::from_re(value).derivative(index)
-}
-
-/// The derivative of `dual` by the `index`-th quantity of its pass.
-#[cfg(feature = "std")]
-pub fn derivative(dual: &Dual, index: usize) -> f64 {
-    dual.eps.0.as_ref().map_or(0.0, |d| d[index])
-}
-
-#[cfg(test)]
+#[cfg(all(test, feature = "std"))]
 mod tests {
     use super::*;
+    use crate::{Dual, derivative, variable};
 
     #[test]
     fn a_branch_takes_the_derivative_of_its_side() {
