@@ -91,7 +91,7 @@ fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<&'static st
         .plant
         .channels
         .iter()
-        .filter(|c| misfit(c, meta).is_none() && is_seen(model, c))
+        .filter(|c| misfit(c, meta).is_none() && is_seen(model, meta, c))
         .collect();
     let mut families: Vec<(&str, Vec<&'static Channel>)> = Vec::new();
     for channel in fitting {
@@ -123,13 +123,14 @@ fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<&'static st
 }
 
 /// Whether what happens at a channel can show in what is measured.
-fn is_seen(model: &Model, channel: &Channel) -> bool {
+fn is_seen(model: &Model, meta: &EffectMeta, channel: &Channel) -> bool {
     let Place::Output(index) = channel.place else {
         return true;
     };
     model.measured.iter().any(|m| {
         m.index == index
-            || matches!(&m.sensor, Sensor::EncoderCounts(encoder)
+            // Behind counts an encoder's past is not known, only its present.
+            || !meta.memory && matches!(&m.sensor, Sensor::EncoderCounts(encoder)
                 if encoder.of.keys().any(|s| model.find_signal(s) == Ok(index)))
     })
 }

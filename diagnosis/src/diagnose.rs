@@ -283,33 +283,28 @@ fn refused(verdict: Conclusion, faults: &[Fault], advice: Vec<Advice>) -> Diagno
     }
 }
 
-/// Share of the flow that a speed to be estimated starts from.
-const FLOW_START: f64 = 0.1;
+/// Shares of the flow that a speed to be estimated starts from.
+const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
 
 /// Values to start a candidate from: the nominal ones, and its own a noticeable step from neutral.
 fn starts(candidate: &Candidate, nominal: &Solution, duration: f64) -> Vec<Vec<f64>> {
     let mut all = vec![nominal.values.clone()];
     for i in candidate.own() {
         let parameter = &candidate.model.parameters[i];
-        let declaration = parameter.declaration;
+        let nearest = |value: f64| parameter.declaration.nearest(value);
         let neutral = parameter.value.unwrap_or(0.0);
+        let listed = parameter.starts(duration);
         let values: Vec<f64> = if !parameter.free {
             vec![neutral]
-        } else if !declaration.starts.is_empty() {
-            let unit = if declaration.starts_in_durations {
-                duration
-            } else {
-                1.0
-            };
-            declaration
-                .starts
+        } else if parameter.declaration.unit == "flow" && candidate.flow > 0.0 {
+            FLOW_STARTS
                 .iter()
-                .map(|s| declaration.nearest(s * unit))
+                .map(|s| nearest(s * candidate.flow))
                 .collect()
-        } else if declaration.unit == "flow" && candidate.flow > 0.0 {
-            vec![declaration.nearest(FLOW_START * candidate.flow)]
+        } else if listed.is_empty() {
+            vec![nearest(neutral + parameter.scale())]
         } else {
-            vec![declaration.nearest(neutral + declaration.scale)]
+            listed.into_iter().map(nearest).collect()
         };
         all = all
             .iter()

@@ -60,7 +60,7 @@ impl Problem<'_> {
             // The solver stays strictly inside the range; at its end the end is meant.
             let declaration = self.model.parameters[*i].declaration;
             for end in [declaration.bounds().0, declaration.bounds().1] {
-                if (values[*i] - end).abs() < 1e-9 * declaration.scale {
+                if (values[*i] - end).abs() < 1e-9 * self.model.parameters[*i].scale() {
                     values[*i] = end;
                 }
             }
@@ -103,7 +103,7 @@ impl Problem<'_> {
                         (value + quantile * error).min(high),
                     ]);
                 }
-                let margin = 1e-4 * parameter.declaration.scale;
+                let margin = 1e-4 * parameter.scale();
                 estimate.verdict = if flatness.dead[k] {
                     Verdict::Dead
                 } else if flatness.flat[k] {

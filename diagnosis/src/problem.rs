@@ -132,8 +132,8 @@ impl<'a> Problem<'a> {
         let mut upper = Vec::new();
         for &i in &free {
             let declaration = model.parameters[i].declaration;
-            let scale = declaration
-                .scale
+            let scale = model.parameters[i]
+                .scale()
                 .max(model.parameters[i].value.map_or(0.0, f64::abs));
             let (low, high) = declaration.bounds();
             scales.push(scale);
@@ -483,7 +483,7 @@ impl<'a> Problem<'a> {
                 let parameter = &self.model.parameters[*i];
                 Named {
                     name: &parameter.name,
-                    declared: parameter.declaration.scale,
+                    declared: parameter.scale(),
                     scale: *scale,
                 }
             })

@@ -52,10 +52,17 @@ pub(crate) fn run(options: &AddOptions) -> Result<(), Failure> {
             &fitting.iter().map(|c| c.id).collect::<Vec<_>>(),
         )?;
     }
-    let parameters: Vec<(&str, f64)> = meta
-        .parameters
+    let Some(with) = model.with_effect(id, &at) else {
+        return Err(Failure::request(format!(
+            "`{id}` does not fit {}",
+            at.join(", ")
+        )));
+    };
+    // The model knows what the defaults come to at these channels.
+    let own = &with.parameters[model.parameters.len()..];
+    let parameters: Vec<(&str, f64)> = own
         .iter()
-        .filter_map(|p| Some((p.id, p.default?)))
+        .filter_map(|p| Some((p.declaration.id, p.value?)))
         .collect();
     let text = source.with_effect(id, &at, &parameters);
     // What was written must read.
