@@ -1,0 +1,125 @@
+//! Between the command in the log and the voltage that is demanded of the motor.
+
+use crate::delay::Delay;
+
+/// What an amplifier does to a command, in this order: transport delay, filter, dead zone, limit,
+/// gain and offset.
+///
+/// ```text
+/// u1(t) = command(t - delay)     lag u2' = u1 - u2
+/// u3 = u2 -/+ dead_zone beyond ±dead_zone, 0 within     V = gain clamp(u3, ±limit) + offset
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct AmplifierParts {
+    /// Transport delay, s; kept to a whole number of integration steps.
+    pub(crate) delay: f64,
+    /// Time constant of the filter, s; 0: none.
+    pub(crate) lag: f64,
+    /// Voltage below which nothing comes out, and which is missing above, V.
+    pub(crate) dead_zone: f64,
+    /// Largest voltage, V.
+    pub(crate) limit: f64,
+    /// Gain.
+    pub(crate) gain: f64,
+    /// Offset, V.
+    pub(crate) offset: f64,
+}
+
+impl Default for AmplifierParts {
+    fn default() -> Self {
+        Self {
+            delay: 0.0,
+            lag: 0.0,
+            dead_zone: 0.0,
+            limit: f64::INFINITY,
+            gain: 1.0,
+            offset: 0.0,
+        }
+    }
+}
+
+/// An amplifier at work.
+#[derive(Clone, Debug)]
+pub(crate) struct Amplifier {
+    parts: AmplifierParts,
+    line: Delay<f64>,
+    filtered: f64,
+    /// Of the filter over a step: what remains of the difference at the end, and on average.
+    decay: f64,
+    mean: f64,
+}
+
+impl Amplifier {
+    pub(crate) fn new(parts: AmplifierParts, step: f64) -> Self {
+        let x = step / parts.lag;
+        let (decay, mean) = if parts.lag > 0.0 {
+            ((-x).exp(), -(-x).exp_m1() / x)
+        } else {
+            (0.0, 0.0)
+        };
+        Self {
+            parts,
+            line: Delay::new((parts.delay / step).round() as usize, 0.0),
+            filtered: 0.0,
+            decay,
+            mean,
+        }
+    }
+
+    /// Mean voltage demanded over a step in which `command` is applied, V.
+    pub(crate) fn step(&mut self, command: f64) -> f64 {
+        let parts = &self.parts;
+        let late = self.line.push(command);
+        let difference = self.filtered - late;
+        let filtered = late + difference * self.mean;
+        self.filtered = late + difference * self.decay;
+        let live = (filtered.abs() - parts.dead_zone)
+            .max(0.0)
+            .copysign(filtered);
+        parts.gain * live.clamp(-parts.limit, parts.limit) + parts.offset
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_chain_does_what_it_says() {
+        let mut late = Amplifier::new(
+            AmplifierParts {
+                delay: 0.003,
+                ..AmplifierParts::default()
+            },
+            1e-3,
+        );
+        let out: Vec<f64> = (0..5).map(|_| late.step(2.0)).collect();
+        assert_eq!(out, [0.0, 0.0, 0.0, 2.0, 2.0]);
+        let mut dead = Amplifier::new(
+            AmplifierParts {
+                dead_zone: 1.0,
+                limit: 6.0,
+                gain: 2.0,
+                offset: 0.5,
+                ..AmplifierParts::default()
+            },
+            1e-3,
+        );
+        assert_eq!(
+            [0.5, -3.0, 9.0].map(|v| dead.step(v)),
+            [0.5, -3.5, 12.5],
+            "within the zone, below it, beyond the limit"
+        );
+        let mut slow = Amplifier::new(
+            AmplifierParts {
+                lag: 0.05,
+                ..AmplifierParts::default()
+            },
+            1e-3,
+        );
+        for _ in 0..50 {
+            slow.step(1.0);
+        }
+        assert!((slow.filtered - (1.0 - (-1.0f64).exp())).abs() < 1e-12);
+    }
+}

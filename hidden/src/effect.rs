@@ -1,0 +1,101 @@
+//! What can be hidden, by the ids that the diagnosis uses.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::error::HiddenError;
+use crate::robot::Robot;
+
+macro_rules! effects {
+    ($($variant:ident $id:literal $home:ident $doc:literal,)*) => {
+        /// An effect that a recording can hide.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Hidden {
+            $(#[doc = $doc] $variant,)*
+        }
+
+        impl Hidden {
+            /// All of them.
+            pub const ALL: &'static [Hidden] = &[$(Hidden::$variant,)*];
+
+            /// The effect's id, e.g. `coulomb_friction`.
+            pub fn id(self) -> &'static str {
+                match self { $(Hidden::$variant => $id,)* }
+            }
+
+            /// One line: what is hidden.
+            pub fn doc(self) -> &'static str {
+                match self { $(Hidden::$variant => $doc,)* }
+            }
+
+            /// The machine on which it is shown.
+            pub fn home(self) -> Robot {
+                match self { $(Hidden::$variant => Robot::$home,)* }
+            }
+        }
+    };
+}
+
+effects! {
+    CoulombFriction "coulomb_friction" Twil "dry friction of both wheels",
+    StribeckFriction "stribeck_friction" Twil "dry friction of both wheels, higher when breaking away",
+    ViscousFriction "viscous_friction" Twil "viscous friction of the right wheel alone",
+    DirectionalFriction "directional_friction" Twil "dry and viscous friction of both wheels, higher backwards",
+    QuadraticDrag "quadratic_drag" Twil "drag of both wheels, with the square of the speed",
+    ScrubFriction "scrub_friction" Twil "dry friction against turning",
+    TorqueRipple "torque_ripple" Twil "cogging of the right wheel, 12 times per revolution",
+    Backlash "backlash" Axis "play between motor and load; the encoder sits at the load",
+    ConstantForce "constant_force" Axis "a weight on a rope",
+    GravitySlope "gravity_slope" Twil "a floor that is not level",
+    GravityPendulum "gravity_pendulum" Axis "an arm, horizontal at angle 0",
+    LinearStiffness "linear_stiffness" Axis "a spring that pulls back to angle 0",
+    CubicStiffness "cubic_stiffness" Axis "a hardening spring without linear part",
+    CentrifugalOffset "centrifugal_offset" Twil "centre of mass ahead of the axle",
+    WheelSlip "wheel_slip" Twil "tyres on a slippery floor; odometry from undriven measuring wheels",
+    DeadZone "dead_zone" Twil "amplifiers that do nothing below a threshold",
+    InputSaturation "input_saturation" Twil "amplifiers that stop below the commanded 9 V",
+    InputDelay "input_delay" Twil "commands that take effect late",
+    ActuatorLag "actuator_lag" Twil "a filter before both amplifiers",
+    InputOffset "input_offset" Twil "a bias on the right amplifier",
+    GainAsymmetry "gain_asymmetry" Twil "right amplifier stronger, left one weaker",
+    BatterySag "battery_sag" Twil "a battery with internal resistance",
+    WindingHeating "winding_heating" Twil "windings that grow warm and resistive",
+    PayloadChange "payload_change" Twil "a load put on board while driving",
+    SensorDelay "sensor_delay" Twil "odometry that is read late",
+    SensorLag "sensor_lag" Twil "odometry from filtered counts",
+    SensorOffset "sensor_offset" Twil "a bias on the measured yaw rate",
+    SensorScale "sensor_scale" Twil "a wrong scale on the measured forward speed",
+    WheelRadiusMismatch "wheel_radius_mismatch" Twil "right wheel larger, left one smaller than odometry believes",
+    EncoderRipple "encoder_ripple" Twil "an encoder disc, the right one, that does not turn about its centre",
+}
+
+impl fmt::Display for Hidden {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.id())
+    }
+}
+
+impl FromStr for Hidden {
+    type Err = HiddenError;
+
+    fn from_str(id: &str) -> Result<Self, HiddenError> {
+        Hidden::ALL
+            .iter()
+            .copied()
+            .find(|h| h.id() == id)
+            .ok_or_else(|| HiddenError::UnknownEffect { id: id.to_owned() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_unique_and_read_back() {
+        for effect in Hidden::ALL {
+            assert_eq!(effect.id().parse::<Hidden>().unwrap(), *effect);
+        }
+        assert!("friction".parse::<Hidden>().is_err());
+    }
+}

@@ -1,0 +1,101 @@
+//! Effects at the body: ground, centre of mass, payload.
+
+use crate::contact::Tyre;
+use crate::physics::{GRAVITY, Payload, Physics, Slope};
+use crate::robot::Robot;
+use crate::truth::Concealed;
+
+/// Mass and yaw inertia with rotors and wheels that roll, kg and kg m²; on the axis the inertia of
+/// the shaft twice.
+fn effective(m: &Physics) -> [f64; 2] {
+    let turning = m.motor.reflected_inertia + m.body.wheel_inertia;
+    match m.robot {
+        Robot::Axis => [m.body.mass + turning; 2],
+        Robot::Twil => {
+            let per_wheel = 2.0 * turning / m.body.wheel_radius.powi(2);
+            let lever = m.body.half_track.powi(2);
+            [m.body.mass + per_wheel, m.body.inertia + per_wheel * lever]
+        }
+    }
+}
+
+/// Dry friction against turning of a tenth of what the motors can do.
+pub(super) fn scrub(m: &mut Physics, mut of: Concealed) -> Concealed {
+    of.at = vec!["body.yaw"];
+    let level = 1.2 * of.size;
+    let torque = level * effective(m)[1];
+    m.scrub += torque;
+    of.fitted("level", level, "rad/s^2")
+        .physical("torque", torque, "N m")
+}
+
+/// A floor that rises by 3°.
+pub(super) fn slope(m: &mut Physics, mut of: Concealed) -> Concealed {
+    of.at = vec!["body.forward"];
+    let angle = 3.0f64.to_radians() * of.size;
+    let direction = 0.6f64;
+    m.slope = Some(Slope { angle, direction });
+    let amplitude = GRAVITY * angle.sin() * m.body.mass / effective(m)[0];
+    of.fitted("cosine", -amplitude * direction.cos(), "m/s^2")
+        .fitted("sine", -amplitude * direction.sin(), "m/s^2")
+        .physical("angle", angle, "rad")
+        .physical("uphill", direction, "rad")
+}
+
+/// Centre of mass 80 mm ahead of the axle.
+pub(super) fn offset(m: &mut Physics, mut of: Concealed) -> Concealed {
+    of.at = vec!["body.forward", "body.yaw"];
+    let offset = 0.08 * of.size;
+    m.mass_offset += offset;
+    let [mass, inertia] = effective(m);
+    let unbalance = m.body.mass * offset;
+    of.fitted("forward", unbalance / mass, "m/rad^2")
+        .fitted("yaw", unbalance / inertia, "1/m")
+        .physical("mass_offset", offset, "m")
+}
+
+/// Tyres with a coefficient of friction of 0.2.
+pub(super) fn slip(m: &mut Physics, mut of: Concealed) -> Concealed {
+    let tyre = Tyre {
+        friction: 0.2 / of.size,
+        slip: 0.003,
+    };
+    m.tyre = Some(tyre);
+    let traction = tyre.friction * 0.5 * m.body.mass * GRAVITY;
+    let limit = traction * m.body.wheel_radius / m.motor.torque_per_volt();
+    of.approximate = true;
+    of.fitted("limit", limit, "V")
+        .physical("friction", tyre.friction, "1")
+        .physical("largest_traction", traction, "N")
+        .physical("slip_scale", tyre.slip, "m/s")
+}
+
+/// Something of 7.2 kg and 0.16 kg m², put on board after 9.7 s.
+pub(super) fn payload(m: &mut Physics, mut of: Concealed) -> Concealed {
+    let [mass, inertia] = effective(m);
+    let payload = Payload {
+        time: 9.7,
+        mass: match m.robot {
+            Robot::Twil => 0.24 * mass * of.size,
+            Robot::Axis => 0.4 * mass * of.size,
+        },
+        inertia: 0.2 * inertia * of.size,
+    };
+    m.payload = Some(payload);
+    let of_robot = m.robot == Robot::Twil;
+    of.at = if of_robot {
+        vec!["inertia.forward", "inertia.yaw"]
+    } else {
+        vec!["inertia"]
+    };
+    let of = of
+        .fitted("time", payload.time, "s")
+        .fitted("fraction", payload.mass / mass, "1");
+    if of_robot {
+        of.fitted("yaw_fraction", payload.inertia / inertia, "1")
+            .physical("mass", payload.mass, "kg")
+            .physical("inertia", payload.inertia, "kg m^2")
+    } else {
+        of.physical("inertia", payload.mass, "kg m^2")
+    }
+}

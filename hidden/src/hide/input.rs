@@ -1,0 +1,95 @@
+//! Effects between command and motor torque: amplifiers, battery, windings.
+
+use crate::amplifier::AmplifierParts;
+use crate::motor::{COPPER, Heat};
+use crate::physics::Physics;
+use crate::robot::Robot;
+use crate::truth::Concealed;
+
+fn at_inputs(m: &mut Physics, of: &mut Concealed) {
+    of.at = match m.robot {
+        Robot::Twil => vec!["input.right", "input.left"],
+        Robot::Axis => vec!["input"],
+    };
+}
+
+fn each(m: &mut Physics, of: &mut Concealed, change: impl Fn(&mut AmplifierParts)) {
+    at_inputs(m, of);
+    m.amplifiers.iter_mut().for_each(change);
+}
+
+/// 0.9 V are lost.
+pub(super) fn dead_zone(m: &mut Physics, mut of: Concealed) -> Concealed {
+    let threshold = 0.9 * of.size;
+    each(m, &mut of, |a| a.dead_zone += threshold);
+    of.fitted("threshold", threshold, "V")
+}
+
+/// No more than 7 V; 2 V less per unit of size.
+pub(super) fn saturation(m: &mut Physics, mut of: Concealed) -> Concealed {
+    let limit = 9.0 - 2.0 * of.size;
+    each(m, &mut of, |a| a.limit = limit);
+    of.fitted("limit", limit, "V")
+}
+
+/// 30 ms late.
+pub(super) fn delay(m: &mut Physics, mut of: Concealed) -> Concealed {
+    let delay = 0.03 * of.size;
+    each(m, &mut of, |a| a.delay += delay);
+    of.fitted("delay", delay, "s")
+}
+
+/// A filter of 40 ms.
+pub(super) fn lag(m: &mut Physics, mut of: Concealed) -> Concealed {
+    let lag = 0.04 * of.size;
+    each(m, &mut of, |a| a.lag = lag);
+    of.fitted("lag", lag, "s")
+}
+
+/// 0.6 V too much on one motor.
+pub(super) fn offset(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_inputs(m, &mut of);
+    of.at.truncate(1);
+    let offset = 0.6 * of.size;
+    m.amplifiers[0].offset += offset;
+    of.fitted("offset", offset, "V")
+}
+
+/// The right motor gets 8 % more, the left one 8 % less.
+pub(super) fn asymmetry(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_inputs(m, &mut of);
+    let share = 0.08 * of.size;
+    m.amplifiers[0].gain *= 1.0 + share;
+    m.amplifiers[1].gain *= 1.0 - share;
+    of.fitted("difference", share, "1")
+}
+
+/// An internal resistance of 2 Ohm behind 12 V. As a share of the supply per volt over a winding that
+/// is `duty R_i/(R V_oc)`: the value given is that of the duty of ±9 V.
+pub(super) fn sag(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_inputs(m, &mut of);
+    let resistance = 2.0 * of.size;
+    m.battery.resistance += resistance;
+    of.approximate = true;
+    let supply = m.battery.open_circuit;
+    let share = 9.0 / supply * resistance / (m.motor.resistance * supply);
+    of.fitted("resistance", share, "1/V")
+        .physical("internal_resistance", resistance, "Ohm")
+        .physical("winding_resistance", m.motor.resistance, "Ohm")
+        .physical("open_circuit_voltage", supply, "V")
+}
+
+/// Windings that hold 0.45 J/K: within 25 s of PRBS their resistance grows by a sixth. The fitted
+/// effect grows evenly with time: its rate is the mean one of the recording.
+pub(super) fn heating(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_inputs(m, &mut of);
+    let heat = Heat {
+        capacity: 0.45 / of.size,
+        resistance: 60.0 * of.size,
+    };
+    m.heat = Some(heat);
+    of.approximate = true;
+    of.physical("heat_capacity", heat.capacity, "J/K")
+        .physical("thermal_resistance", heat.resistance, "K/W")
+        .physical("temperature_coefficient", COPPER, "1/K")
+}

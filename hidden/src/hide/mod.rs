@@ -1,0 +1,100 @@
+//! What each effect of each size changes in a machine.
+
+mod body;
+mod effort;
+mod input;
+mod output;
+
+use crate::error::HiddenError;
+use crate::physics::Physics;
+use crate::robot::Robot;
+use crate::truth::Concealed;
+use crate::{Hidden, Hidden as H};
+
+const WHEELS: &[&str] = &["wheel.right", "wheel.left"];
+const SHAFT: &[&str] = &["shaft"];
+
+/// Builds `effect` into the machine and says what is true then.
+pub(crate) fn hide(
+    machine: &mut Physics,
+    effect: Hidden,
+    size: f64,
+) -> Result<Concealed, HiddenError> {
+    let largest = largest(effect);
+    if !(size > 0.0 && size <= largest) {
+        return Err(HiddenError::Size {
+            effect,
+            size,
+            largest,
+        });
+    }
+    if !fits(effect, machine.robot) {
+        return Err(HiddenError::NotHere {
+            effect,
+            robot: machine.robot.name(),
+        });
+    }
+    let shafts = match machine.robot {
+        Robot::Twil => WHEELS,
+        Robot::Axis => SHAFT,
+    };
+    let concealed = Concealed::new(effect, size, shafts);
+    Ok(match effect {
+        H::CoulombFriction => effort::coulomb(machine, concealed),
+        H::StribeckFriction => effort::stribeck(machine, concealed),
+        H::ViscousFriction => effort::viscous(machine, concealed),
+        H::DirectionalFriction => effort::directional(machine, concealed),
+        H::QuadraticDrag => effort::drag(machine, concealed),
+        H::TorqueRipple => effort::ripple(machine, concealed),
+        H::Backlash => effort::backlash(machine, concealed),
+        H::ConstantForce => effort::constant(machine, concealed),
+        H::GravityPendulum => effort::pendulum(machine, concealed),
+        H::LinearStiffness => effort::spring(machine, concealed),
+        H::CubicStiffness => effort::hardening(machine, concealed),
+        H::ScrubFriction => body::scrub(machine, concealed),
+        H::GravitySlope => body::slope(machine, concealed),
+        H::CentrifugalOffset => body::offset(machine, concealed),
+        H::WheelSlip => body::slip(machine, concealed),
+        H::PayloadChange => body::payload(machine, concealed),
+        H::DeadZone => input::dead_zone(machine, concealed),
+        H::InputSaturation => input::saturation(machine, concealed),
+        H::InputDelay => input::delay(machine, concealed),
+        H::ActuatorLag => input::lag(machine, concealed),
+        H::InputOffset => input::offset(machine, concealed),
+        H::GainAsymmetry => input::asymmetry(machine, concealed),
+        H::BatterySag => input::sag(machine, concealed),
+        H::WindingHeating => input::heating(machine, concealed),
+        H::SensorDelay => output::delay(machine, concealed),
+        H::SensorLag => output::lag(machine, concealed),
+        H::SensorOffset => output::offset(machine, concealed),
+        H::SensorScale => output::scale(machine, concealed),
+        H::WheelRadiusMismatch => output::radius(machine, concealed),
+        H::EncoderRipple => output::ripple(machine, concealed),
+    })
+}
+
+/// Above this size the formula of the effect makes no sense.
+fn largest(effect: Hidden) -> f64 {
+    match effect {
+        // The centre of mass would be further out than the inertia allows.
+        H::CentrifugalOffset => 2.1,
+        // The limit would be 0.
+        H::InputSaturation => 4.0,
+        _ => 10.0,
+    }
+}
+
+fn fits(effect: Hidden, robot: Robot) -> bool {
+    match effect {
+        H::ConstantForce | H::GravityPendulum | H::LinearStiffness | H::CubicStiffness => {
+            robot == Robot::Axis
+        }
+        H::ScrubFriction
+        | H::GravitySlope
+        | H::CentrifugalOffset
+        | H::WheelSlip
+        | H::GainAsymmetry
+        | H::WheelRadiusMismatch => robot == Robot::Twil,
+        _ => true,
+    }
+}

@@ -1,0 +1,79 @@
+//! Effects between the motion and the number in the log.
+
+use crate::odometry::Eccentricity;
+use crate::physics::Physics;
+use crate::robot::Robot;
+use crate::truth::Concealed;
+
+fn at_sensors(m: &Physics, of: &mut Concealed) {
+    of.at = match m.robot {
+        Robot::Twil => vec!["sensor.linear_velocity", "sensor.angular_velocity"],
+        Robot::Axis => vec!["sensor.speed"],
+    };
+}
+
+/// 30 ms late.
+pub(super) fn delay(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_sensors(m, &mut of);
+    let delay = 0.03 * of.size;
+    m.odometry.delay += delay;
+    of.fitted("delay", delay, "s")
+}
+
+/// A filter of 40 ms on the counts.
+pub(super) fn lag(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_sensors(m, &mut of);
+    let lag = 0.04 * of.size;
+    m.odometry.lag = lag;
+    of.fitted("lag", lag, "s")
+}
+
+/// 0.1 rad/s on the yaw rate; on the axis 0.25 rad/s.
+pub(super) fn offset(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_sensors(m, &mut of);
+    let (signal, offset) = match m.robot {
+        Robot::Twil => (1, 0.1 * of.size),
+        Robot::Axis => (0, 0.25 * of.size),
+    };
+    of.at = vec![of.at[signal]];
+    m.odometry.offset[signal] += offset;
+    of.fitted("offset", offset, "rad/s")
+}
+
+/// 8 % too much on the first signal.
+pub(super) fn scale(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_sensors(m, &mut of);
+    of.at.truncate(1);
+    let share = 0.08 * of.size;
+    m.odometry.scale[0] *= 1.0 + share;
+    of.fitted("error", share, "1")
+}
+
+/// The right wheel is 5 % larger, the left one 5 % smaller than odometry believes. They also push less
+/// and more: with the mismatch of the counts comes one of the gains.
+pub(super) fn radius(m: &mut Physics, mut of: Concealed) -> Concealed {
+    of.at = vec!["encoder.right", "encoder.left"];
+    of.approximate = true;
+    let share = 0.05 * of.size;
+    m.wheel_radius[0] *= 1.0 + share;
+    m.wheel_radius[1] *= 1.0 - share;
+    let [right, left] = m.wheel_radius;
+    of.fitted("mismatch", share, "1")
+        .physical("radius_right", right, "m")
+        .physical("radius_left", left, "m")
+}
+
+/// The first disc off centre by 4.6° of reading.
+pub(super) fn ripple(m: &mut Physics, mut of: Concealed) -> Concealed {
+    let (amplitude, phase) = (0.08 * of.size, 0.7f64);
+    m.odometry.eccentricity[0] = Eccentricity { amplitude, phase };
+    of.at = match m.robot {
+        Robot::Twil => vec!["encoder.right"],
+        Robot::Axis => vec!["sensor.angle"],
+    };
+    of.fitted("sine", amplitude * phase.cos(), "rad").fitted(
+        "cosine",
+        amplitude * phase.sin(),
+        "rad",
+    )
+}

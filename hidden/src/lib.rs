@@ -1,0 +1,49 @@
+//! Recordings of machines that hide a physical effect, and the truth about them.
+//!
+//! A test that simulates a model and then finds that very model proves little. The machines here
+//! are built from parts (masses, inertias, torques in N m, currents in windings of some
+//! inductance, dry friction that really sticks, gears with teeth, encoders with marks) and share
+//! neither equations nor integrator with the models that are held against them. Without an effect
+//! and without inductance they obey the lumped equations of the paper exactly, by construction:
+//! [`Robot::parts`] says how.
+//!
+//! ```
+//! use loopsight_hidden::{Experiment, Hidden, Robot, record};
+//! let log = record(
+//!     Robot::Twil,
+//!     &[(Hidden::DeadZone, 1.0), (Hidden::BatterySag, 0.5)],
+//!     Experiment::MultiLevel,
+//!     7,
+//! )?;
+//! assert!(log.floor() < 0.05);
+//! # Ok::<(), loopsight_hidden::HiddenError>(())
+//! ```
+
+mod amplifier;
+mod contact;
+mod delay;
+mod effect;
+mod error;
+mod experiment;
+mod friction;
+mod hide;
+mod library;
+mod machine;
+mod model_file;
+mod motor;
+mod odometry;
+mod physics;
+mod random;
+mod recording;
+mod refit;
+mod robot;
+mod truth;
+
+pub use effect::Hidden;
+pub use error::HiddenError;
+pub use experiment::{DURATION, Experiment, PERIOD};
+pub use library::{visibility, write_library};
+pub use recording::{Recording, nrmse, overall, record, record_with};
+pub use refit::{Refit, refit};
+pub use robot::{Body, Lumped, Motor, Robot};
+pub use truth::{Concealed, Quantity, Truth};

@@ -1,0 +1,107 @@
+//! Writes the recordings of `examples/hidden-effect`, and says how visible each effect is.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use loopsight_hidden::{
+    Experiment, Hidden, HiddenError, Robot, record, record_with, refit, visibility, write_library,
+};
+
+const USAGE: &str = "usage:
+  loopsight-hidden all -o FOLDER      write every effect's recordings and the index
+  loopsight-hidden table              print how much each effect changes the signals
+  loopsight-hidden one EFFECT[=SIZE][+EFFECT[=SIZE]] prbs|multi_level|mixed SEED -o FILE.csv";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let done = match words.as_slice() {
+        ["all", "-o", folder] => write_library(&PathBuf::from(folder)),
+        ["table"] => table(),
+        ["one", effects, experiment, seed, "-o", file] => {
+            let experiment = Experiment::ALL
+                .into_iter()
+                .find(|e| e.name() == *experiment);
+            match (experiment, seed.parse()) {
+                (Some(experiment), Ok(seed)) => one(effects, experiment, seed, file),
+                _ => return misused(),
+            }
+        }
+        _ => return misused(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn misused() -> ExitCode {
+    eprintln!("{USAGE}");
+    ExitCode::from(2)
+}
+
+fn one(effects: &str, experiment: Experiment, seed: u64, file: &str) -> Result<(), HiddenError> {
+    let mut hidden = Vec::new();
+    for entry in effects.split('+') {
+        let (id, size) = entry.split_once('=').unwrap_or((entry, "1"));
+        hidden.push((id.parse::<Hidden>()?, size.parse().unwrap_or(f64::NAN)));
+    }
+    let robot = hidden[0].0.home();
+    let recording = record(robot, &hidden, experiment, seed)?;
+    print!("{}", recording.truth.to_toml());
+    recording.write_csv(&PathBuf::from(file))
+}
+
+/// Effects by size and experiment: the change, and what is left of it after a refit to PRBS.
+fn table() -> Result<(), HiddenError> {
+    println!(
+        "in % of the signals' standard deviation; the refit is to the log of the first column"
+    );
+    for robot in [Robot::Twil, Robot::Axis] {
+        for winding in [1e-3, 1e-4] {
+            let log = record_with(robot, &[], Experiment::Prbs, 1, winding)?;
+            println!(
+                "nothing in the {}, windings of {} ms: {:.3} left after refit, floor {:.3}",
+                robot.name(),
+                1e3 * winding,
+                100.0 * refit(&log).left(&log),
+                100.0 * log.floor()
+            );
+        }
+    }
+    println!(
+        "{:24} {:>5} | {:^23} | {:^23} | {:>5}",
+        "", "", "change", "left after refit", ""
+    );
+    let head = ["prbs", "levels", "mixed"]
+        .map(|h| format!("{h:>7}"))
+        .join(" ");
+    println!(
+        "{:24} {:>5} | {head} | {head} | {:>5}",
+        "effect", "size", "floor"
+    );
+    for effect in Hidden::ALL {
+        for size in [0.5, 1.0, 2.0] {
+            let robot = effect.home();
+            let mut change = String::new();
+            let mut left = String::new();
+            let log = record(robot, &[(*effect, size)], Experiment::Prbs, 1)?;
+            let fit = refit(&log);
+            for experiment in Experiment::ALL {
+                let share = visibility(robot, *effect, size, experiment, 1)?;
+                change.push_str(&format!(" {:7.2}", 100.0 * share));
+                let test = record(robot, &[(*effect, size)], experiment, 1)?;
+                left.push_str(&format!(" {:7.2}", 100.0 * fit.left(&test)));
+            }
+            println!(
+                "{:24} {size:5} |{change} |{left} | {:5.2}",
+                effect.id(),
+                100.0 * log.floor()
+            );
+        }
+    }
+    Ok(())
+}

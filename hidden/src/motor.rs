@@ -1,0 +1,177 @@
+//! Windings, their heat, and the battery they share.
+
+use crate::robot::Motor;
+
+/// The winding of one motor: its current and its temperature.
+///
+/// Over a step with constant voltage and speed the current is known exactly,
+///
+/// ```text
+/// i(t) = i∞ + (i0 - i∞) exp(-t R/L)     i∞ = (V - K_a Ω/n)/R
+/// ```
+///
+/// and so is its mean, which makes the torque; `L → 0` needs no special case. The copper heats by
+/// `C T' = R i² - (T - T_a)/R_th` and its resistance grows by 0.393 % per kelvin.
+///
+/// Reference: R. Krishnan (2001), "Electric Motor Drives", section 2.4; resistance of copper: IEC
+/// 60028.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Winding {
+    motor: Motor,
+    step: f64,
+    /// Current at the start of the step, A.
+    pub(crate) current: f64,
+    /// Resistance at the present temperature, Ohm.
+    resistance: f64,
+    decay: f64,
+    mean: f64,
+    heat: Option<Heat>,
+    /// Above the ambient temperature, K.
+    pub(crate) warmth: f64,
+    lost: f64,
+}
+
+/// Thermal properties of a winding.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Heat {
+    /// Heat capacity, J/K.
+    pub(crate) capacity: f64,
+    /// Thermal resistance to the surroundings, K/W.
+    pub(crate) resistance: f64,
+}
+
+/// Relative change of the resistance of copper, 1/K.
+pub(crate) const COPPER: f64 = 0.003_93;
+
+impl Winding {
+    pub(crate) fn new(motor: Motor, heat: Option<Heat>, step: f64) -> Self {
+        let mut winding = Self {
+            motor,
+            step,
+            current: 0.0,
+            resistance: motor.resistance,
+            decay: 0.0,
+            mean: 0.0,
+            heat,
+            warmth: 0.0,
+            lost: 0.0,
+        };
+        winding.tabulate();
+        winding
+    }
+
+    fn tabulate(&mut self) {
+        self.resistance = self.motor.resistance * (1.0 + COPPER * self.warmth);
+        let x = self.step * self.resistance / self.motor.inductance;
+        self.decay = (-x).exp();
+        self.mean = -(-x).exp_m1() / x;
+    }
+
+    /// Mean torque at the gear's output over a step, N m, and the current at its end, A.
+    pub(crate) fn torque(&self, voltage: f64, speed: f64) -> (f64, f64) {
+        let motor = &self.motor;
+        let rotor = speed / motor.gear_ratio;
+        let settled = (voltage - motor.back_emf_constant * rotor) / self.resistance;
+        let mean = settled + (self.current - settled) * self.mean;
+        let end = settled + (self.current - settled) * self.decay;
+        let torque = motor.torque_constant * mean - motor.rotor_friction * rotor;
+        (torque / motor.gear_ratio, end)
+    }
+
+    /// Takes over the current at the end of a step.
+    pub(crate) fn advance(&mut self, current: f64) {
+        self.lost += self.resistance * current * current * self.step;
+        self.current = current;
+    }
+
+    /// Turns the energy lost over the last `period` s into heat.
+    pub(crate) fn warm(&mut self, period: f64) {
+        if let Some(heat) = self.heat {
+            let cooling = self.warmth / heat.resistance * period;
+            self.warmth += (self.lost - cooling) / heat.capacity;
+            self.tabulate();
+        }
+        self.lost = 0.0;
+    }
+}
+
+/// A battery behind the amplifiers, which switch its voltage on for a share of the time.
+///
+/// ```text
+/// duty = V_demanded/V_oc, at most ±1     V_motor = duty (V_oc - R_i I)     I = max(0, Σ duty i)
+/// ```
+///
+/// A diode keeps braking motors from charging it, so the voltage only falls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Battery {
+    /// Open-circuit voltage, V.
+    pub(crate) open_circuit: f64,
+    /// Internal resistance, Ohm.
+    pub(crate) resistance: f64,
+}
+
+impl Battery {
+    /// What reaches the motors of the voltages demanded, at these currents.
+    pub(crate) fn supply(&self, demanded: [f64; 2], currents: [f64; 2]) -> [f64; 2] {
+        let duty = demanded.map(|v| (v / self.open_circuit).clamp(-1.0, 1.0));
+        let load = (duty[0] * currents[0] + duty[1] * currents[1]).max(0.0);
+        let voltage = self.open_circuit - self.resistance * load;
+        duty.map(|d| d * voltage)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Robot;
+
+    #[test]
+    fn a_stalled_winding_follows_its_exponential() {
+        let motor = Robot::Twil.parts().0;
+        let mut winding = Winding::new(motor, None, 1e-4);
+        for k in 1..=50 {
+            let (_, end) = winding.torque(9.0, 0.0);
+            winding.advance(end);
+            let t = 1e-4 * f64::from(k);
+            let exact = 9.0 / motor.resistance * (1.0 - (-t / 1e-3).exp());
+            assert!((end - exact).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn heat_is_what_the_current_loses() {
+        let motor = Robot::Twil.parts().0;
+        let heat = Heat {
+            capacity: 2.0,
+            resistance: 10.0,
+        };
+        let mut winding = Winding::new(motor, Some(heat), 1e-4);
+        for k in 0..2_000_000 {
+            let (_, end) = winding.torque(9.0, 0.0);
+            winding.advance(end);
+            if k % 100 == 99 {
+                winding.warm(0.01);
+            }
+        }
+        // Balance: 81/(R0 (1 + α T)) = T/R_th.
+        let t = winding.warmth;
+        let balance = 81.0 / (motor.resistance * (1.0 + COPPER * t)) - t / 10.0;
+        assert!(balance.abs() < 1e-3, "{t} K: {balance} W");
+    }
+
+    #[test]
+    fn the_battery_only_falls() {
+        let battery = Battery {
+            open_circuit: 12.0,
+            resistance: 1.0,
+        };
+        for currents in [[0.5, 0.5], [-0.5, 0.2], [-1.0, -1.0]] {
+            for demanded in [[9.0, 9.0], [9.0, -9.0], [-3.0, 0.0], [20.0, 6.0]] {
+                let got = battery.supply(demanded, currents);
+                for (v, d) in got.iter().zip(demanded) {
+                    assert!(v.abs() <= d.abs().min(12.0) + 1e-12 && v * d >= 0.0);
+                }
+            }
+        }
+    }
+}
