@@ -26,9 +26,15 @@ pub fn run_page(context: &Context, record: &LoopRecord) -> String {
     if !record.parameters.is_empty() || !record.innovations.is_empty() {
         body.push_str(&section(
             "What the estimator learned",
-            "Parameters with a band of ± 2 standard deviations; below them the innovation: what \
-             each measurement told that was not expected. Wild first guesses may be out of sight: \
-             double-click to see all.",
+            &format!(
+                "Parameters{}; below them the innovation: what each measurement told that was not \
+                 expected. Wild first guesses may be out of sight: double-click to see all.",
+                if record.parameters.iter().any(|p| p.std.is_some()) {
+                    " with a band of ± 2 standard deviations"
+                } else {
+                    ""
+                }
+            ),
             &estimator(record).html(),
         ));
     }
