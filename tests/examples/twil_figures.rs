@@ -244,9 +244,11 @@ fn drive(path: &Path, robot: Option<Box<dyn DriverPart>>) -> Outcome<Driven> {
             .tick(&reference)
             .map_err(|e| format!("{e:?}"))?;
         driven.time.push(time);
-        for i in 0..n {
-            driven.reference[i].push(reference[i]);
-            driven.measured[i].push(step.measured[i]);
+        for (series, value) in driven.reference.iter_mut().zip(&reference) {
+            series.push(*value);
+        }
+        for (series, value) in driven.measured.iter_mut().zip(step.measured) {
+            series.push(*value);
         }
     }
     driven.ideal = file

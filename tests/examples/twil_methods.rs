@@ -245,9 +245,9 @@ fn significant(value: f64, digits: i32) -> String {
     format!("{value:.decimals$}")
 }
 
-/// A percentage with sign; what is not worth a digit is 0.
+/// A percentage with sign; what depends on when a solver stops is 0.
 fn signed(value: f64) -> String {
-    if value.abs() < 5e-7 {
+    if value.abs() < 5e-5 {
         return "0".to_owned();
     }
     let text = significant(value, 2);
