@@ -189,6 +189,37 @@ pub fn unit_at(unit: &str, channel: &Channel, plant: &'static PlantMeta) -> (Str
     (filled, total)
 }
 
+impl Model {
+    /// The model with its `index`-th effect replaced by the effect `id` at the same channels;
+    /// parameters of the same name keep their values.
+    pub fn with_effect_replaced(&self, index: usize, id: &str) -> Option<Model> {
+        let old = self.effects.get(index)?;
+        let mut model = self.clone();
+        model.effects.clear();
+        model.parameters.truncate(self.n_plant_parameters);
+        for (k, effect) in self.effects.iter().enumerate() {
+            let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
+            let new = if k == index { id } else { effect.meta.id };
+            model = model.with_effect(new, &at)?;
+            let first = model.effects[k].first_parameter;
+            for (i, declaration) in model.effects[k].meta.parameters.iter().enumerate() {
+                let same = effect
+                    .meta
+                    .parameters
+                    .iter()
+                    .position(|p| p.id == declaration.id);
+                if let Some(same) = same {
+                    let from = &self.parameters[effect.first_parameter + same];
+                    model.parameters[first + i].value = from.value;
+                    model.parameters[first + i].free = from.free;
+                }
+            }
+        }
+        debug_assert_eq!(old.at.len(), model.effects[index].at.len());
+        Some(model)
+    }
+}
+
 /// Why an effect cannot act on a channel; `None` when it can.
 pub fn misfit(channel: &Channel, effect: &EffectMeta) -> Option<String> {
     let kind = channel.place.kind();

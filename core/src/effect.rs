@@ -33,6 +33,9 @@ pub struct EffectMeta {
     pub parameters: &'static [Parameter],
     /// Acts on all its channels together, as one instance: one supply, one body.
     pub shared_only: bool,
+    /// How rare it is: 0 nearly every machine has it, 1 common, 2 rare. Orders explanations that a
+    /// recording cannot tell apart.
+    pub rarity: u8,
     /// Ids of effects that it contains as special cases: it has to earn its further parameters.
     pub simpler: &'static [&'static str],
     /// States per channel it is attached to.
@@ -57,6 +60,7 @@ impl EffectMeta {
         yields_to: &[],
         sided: false,
         shared_only: false,
+        rarity: 1,
         simpler: &[],
         parameters: &[],
         states: 0,

@@ -14,7 +14,7 @@ use crate::candidates::{Candidate, candidates};
 use crate::fit::{Estimate, Fit, FitError, FitSettings, Verdict};
 use crate::floor::floor;
 use crate::holdout::Holdout;
-use crate::judge::{Losses, advantage, nrmse};
+use crate::judge::{Losses, advantage, nrmse, significance};
 use crate::prediction::signal_rms;
 use crate::problem::{Effort, Problem, Solution};
 use crate::sufficiency;
@@ -62,7 +62,8 @@ pub struct Explanation {
     pub nrmse: f64,
     /// The effect's parameters, by their ids.
     pub parameters: BTreeMap<String, Estimate>,
-    /// How many standard errors its parameters are from doing nothing.
+    /// How many standard errors it is from doing nothing: root of the likelihood ratio on all
+    /// samples that are independent of each other.
     pub significance: f64,
     /// Candidates that these data cannot tell from it.
     pub indistinguishable_from: Vec<Place>,
@@ -122,23 +123,30 @@ const FINAL: Effort = Effort {
 /// An explanation must beat the plain model by so many standard errors on data neither saw. There
 /// are about a hundred candidates: a chance of 1e-4 each is one of 1 % for all.
 const BEATS: f64 = 3.7;
-/// Its parameters must be so many standard errors from doing nothing.
+/// It must be so many standard errors from doing nothing.
 const SIGNIFICANT: f64 = 4.0;
 /// With so many it need not shine on unseen data, only not fail there: an effect that shows in
 /// transients alone leaves few samples to be judged by.
-const CERTAIN: f64 = 7.0;
+const CERTAIN: f64 = 5.0;
 /// What it explains must be so large beside the floor, as a share of it, to matter.
 const MATTERS: f64 = 0.2;
 /// Explanations whose losses differ by fewer standard errors than this are not told apart.
 const SAME: f64 = 2.0;
 /// Errors within this ratio are the same for all that can be done with them.
 const CLOSE: f64 = 1.01;
+/// An explanation that leaves less than this multiple of the floor explains everything.
+const COMPLETE: f64 = 1.2;
+/// Least share of the standard deviation that an explanation must account for.
+pub(crate) const LEAST: f64 = 0.004;
+/// Share of what the best explanation leaves above the floor by which a smaller one may be worse.
+const BLUR: f64 = 0.3;
 /// Above this multiple of the floor something must be missing.
 const ABOVE_FLOOR: f64 = 1.5;
 
 /// Longest integration step of a first look, s: far below what any sensor sees.
 const LOOK_STEP: f64 = 0.005;
 
+#[derive(Clone)]
 struct Judged {
     candidate: Candidate,
     solution: Solution,
@@ -155,6 +163,18 @@ pub fn diagnose(
     runs: &[Run],
     test: Option<&[Run]>,
     faults: &[Fault],
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<Diagnosis, FitError> {
+    diagnose_above(model, runs, test, faults, LEAST, progress)
+}
+
+/// As [`diagnose`]; an explanation must account for `least` of the standard deviation.
+pub(crate) fn diagnose_above(
+    model: &Model,
+    runs: &[Run],
+    test: Option<&[Run]>,
+    faults: &[Fault],
+    least: f64,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Diagnosis, FitError> {
     if faults.iter().any(|f| f.severity() == Severity::Fatal) {
@@ -215,11 +235,22 @@ pub fn diagnose(
         .collect();
     looked.sort_by(|a, b| nrmse(&a.1.rank).total_cmp(&nrmse(&b.1.rank)));
     let mut judged: Vec<Judged> = Vec::new();
-    let mut taken = vec![false; all.len()];
-    for (i, found) in looked {
-        // Of several starts of one candidate the best counts.
-        if !std::mem::replace(&mut taken[i], true) && judged.len() < FINALISTS {
-            judged.push(found);
+    for k in 0..looked.len() {
+        let (i, found) = &looked[k];
+        // Of several starts of one candidate the best counts, and of an effect and its special case
+        // the special case, unless it is worse.
+        let again = looked[..k].iter().any(|(j, _)| i == j);
+        let needless = looked.iter().any(|(_, other)| {
+            let special = found
+                .candidate
+                .meta
+                .simpler
+                .contains(&other.candidate.meta.id)
+                && found.candidate.at == other.candidate.at;
+            special && nrmse(&other.rank) < CLOSE * nrmse(&found.rank)
+        });
+        if !again && !needless && judged.len() < FINALISTS {
+            judged.push(found.clone());
         }
     }
 
@@ -230,8 +261,8 @@ pub fn diagnose(
     finalists.sort_by(|a, b| nrmse(&a.0.rank).total_cmp(&nrmse(&b.0.rank)));
 
     let floor = floor(model, test.unwrap_or(runs));
-    let mut explanations = explain(&finalists, &holdout);
-    let chosen = choose(&mut explanations, &finalists);
+    let mut explanations = explain(&finalists, &nominal_rank, &holdout);
+    let chosen = choose(&mut explanations, &finalists, floor);
     let missing = chosen.and_then(|i| {
         let (judged, _) = &finalists[i.finalist];
         let of = |plain: &Losses, with: &Losses| {
@@ -241,8 +272,10 @@ pub fn diagnose(
         let unseen = advantage(&nominal_losses, &judged.losses);
         let significance = explanations[0].significance;
         let earned = unseen > BEATS || (unseen > -SAME && significance > CERTAIN);
-        (earned && significance > SIGNIFICANT && explained > MATTERS * floor)
-            .then(|| explanations[0].place.clone())
+        // Down to the noise, or a good part of what there was to explain.
+        let complete = nrmse(&judged.rank) < COMPLETE * floor && explained > MATTERS * floor;
+        let matters = complete || explained > (MATTERS * floor).max(least);
+        (earned && significance > SIGNIFICANT && matters).then(|| explanations[0].place.clone())
     });
     let verdict = match &missing {
         Some(_) => Conclusion::EffectMissing,
@@ -395,33 +428,30 @@ fn place(candidate: &Candidate) -> Place {
     }
 }
 
-fn explain(finalists: &[(Judged, Fit)], holdout: &Holdout<'_>) -> Vec<Explanation> {
+fn explain(
+    finalists: &[(Judged, Fit)],
+    nominal_rank: &Losses,
+    holdout: &Holdout<'_>,
+) -> Vec<Explanation> {
     finalists
         .iter()
         .map(|(judged, fit)| {
             let candidate = &judged.candidate;
             let mut parameters = BTreeMap::new();
-            let mut significance = 0.0f64;
             for i in candidate.own() {
                 let parameter = &candidate.model.parameters[i];
                 let Some(estimate) = fit.parameters.get(&parameter.name) else {
                     continue;
                 };
                 if parameter.free {
-                    let neutral = parameter.value.unwrap_or(0.0);
-                    if let (Some(error), true) =
-                        (estimate.std_error, parameter.declaration.starts.is_empty())
-                    {
-                        significance = significance.max((estimate.value - neutral).abs() / error);
-                    }
+                    parameters.insert(parameter.declaration.id.to_owned(), estimate.clone());
                 }
-                parameters.insert(parameter.declaration.id.to_owned(), estimate.clone());
             }
             Explanation {
                 place: place(candidate),
                 nrmse: nrmse(&judged.losses),
                 parameters,
-                significance: significance.min(1e6),
+                significance: significance(nominal_rank, &judged.rank).min(1e6),
                 indistinguishable_from: Vec::new(),
                 note: note(fit, candidate),
                 model: fit.model.clone(),
@@ -451,19 +481,32 @@ struct Chosen {
 
 /// Puts the smallest explanation that is not significantly worse than the best one first, with
 /// those that cannot be told from it.
-fn choose(explanations: &mut Vec<Explanation>, finalists: &[(Judged, Fit)]) -> Option<Chosen> {
+fn choose(
+    explanations: &mut Vec<Explanation>,
+    finalists: &[(Judged, Fit)],
+    floor: f64,
+) -> Option<Chosen> {
     let best = &finalists.first()?.0;
+    let squared = |i: usize| nrmse(&finalists[i].0.rank).powi(2);
+    let least = squared(0);
+    // While the best explanation itself leaves much unexplained, small differences between
+    // explanations are those of what else is missing.
+    let allowed = least + BLUR * (least - floor * floor).max(0.0);
     let not_worse: Vec<usize> = (0..finalists.len())
         .filter(|i| {
             let rank = &finalists[*i].0.rank;
-            advantage(rank, &best.rank) < SAME || nrmse(rank) < CLOSE * nrmse(&best.rank)
+            advantage(rank, &best.rank) < SAME
+                || nrmse(rank) < CLOSE * nrmse(&best.rank)
+                || squared(*i) < allowed
         })
         .collect();
     let complexity = |i: usize| finalists[i].0.candidate.complexity();
     let chosen = *not_worse.iter().min_by(|a, b| {
-        // Both wheels alike before one wheel: what is built alike fails alike.
+        // The common before the rare, and both wheels alike before one wheel: what is built alike
+        // fails alike.
         let channels = |i: usize| usize::MAX - explanations[i].place.at.len();
-        let key = |i: usize| (complexity(i), channels(i));
+        let rarity = |i: usize| finalists[i].0.candidate.meta.rarity;
+        let key = |i: usize| (complexity(i), rarity(i), channels(i));
         let error = |i: usize| nrmse(&finalists[i].0.rank);
         key(**a)
             .cmp(&key(**b))

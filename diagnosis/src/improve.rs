@@ -5,7 +5,7 @@ use loopsight_core::run::Run;
 use loopsight_recordings::Fault;
 use serde::Serialize;
 
-use crate::diagnose::{Conclusion, Diagnosis, Place, diagnose};
+use crate::diagnose::{Conclusion, Diagnosis, LEAST, Place, diagnose_above};
 use crate::fit::{Fit, FitError, FitSettings, fit};
 
 /// One step of an improvement.
@@ -34,6 +34,9 @@ pub struct Improvement {
     pub best: Option<Fit>,
 }
 
+/// Share of the first error that a further effect must account for: beyond it a library finds
+/// something for every wiggle.
+const WORTH: f64 = 0.06;
 /// Most effects that are added: beyond that a library is fitting, not explaining.
 const MOST: usize = 6;
 
@@ -50,14 +53,17 @@ pub fn improve(
     let mut present = model.clone();
     let mut steps: Vec<Step> = Vec::new();
     let mut diagnoses = Vec::new();
+    let mut first = None;
     let verdict = loop {
         let round = diagnoses.len();
-        let diagnosis = diagnose(&present, runs, test, faults, &|done, total| {
-            progress(round, done, total)
+        let least = first.map_or(LEAST, |nrmse: f64| (WORTH * nrmse).max(LEAST));
+        let diagnosis = diagnose_above(&present, runs, test, faults, least, &|done, total| {
+            progress(round, done, total);
         })?;
         let verdict = diagnosis.verdict;
         if let Some(fitted) = &diagnosis.model {
             if steps.is_empty() {
+                first = Some(diagnosis.nominal.nrmse);
                 steps.push(Step {
                     added: None,
                     nrmse_fit: diagnosis.nominal_fit,
@@ -77,7 +83,7 @@ pub fn improve(
             nrmse_fit: best.nrmse_fit,
             nrmse_test: best.nrmse,
         });
-        present = best.model;
+        present = simplified(best.model, runs, test, faults)?;
     };
     let best = match verdict {
         Conclusion::LogFaulty | Conclusion::DataInsufficient => None,
@@ -97,3 +103,45 @@ pub fn improve(
         best,
     })
 }
+
+/// A simpler effect replaces one that contains it when the error hardly grows: what looked like
+/// breakaway friction may have been friction with a delay that was still missing.
+fn simplified(
+    model: Model,
+    runs: &[Run],
+    test: Option<&[Run]>,
+    faults: &[Fault],
+) -> Result<Model, FitError> {
+    let error = |m: &Model| -> Result<(f64, Model), FitError> {
+        let settings = FitSettings {
+            max_iterations: 20,
+            ..FitSettings::default()
+        };
+        let fitted = fit(m, runs, test, faults, &settings, &|_, _| {})?;
+        Ok((fitted.comparison.nrmse, fitted.model))
+    };
+    let mut best = model;
+    let mut least = None;
+    for index in 0..best.effects.len() {
+        for id in best.effects[index].meta.simpler {
+            let Some(candidate) = best.with_effect_replaced(index, id) else {
+                continue;
+            };
+            let now = match least {
+                Some(now) => now,
+                None => error(&best)?.0,
+            };
+            least = Some(now);
+            let (after, fitted) = error(&candidate)?;
+            if after < SIMPLER * now {
+                best = fitted;
+                least = Some(after);
+                break;
+            }
+        }
+    }
+    Ok(best)
+}
+
+/// How much the error may grow for a simpler explanation.
+const SIMPLER: f64 = 1.02;

@@ -37,6 +37,44 @@ pub(crate) fn advantage(a: &Losses, b: &Losses) -> f64 {
     }
 }
 
+/// How sure it is that `with` explains more than `plain`, as a number of standard errors: the root of
+/// the likelihood ratio `N (plain/with - 1)` of two Gaussian models, with `N` the number of samples
+/// that are independent of each other, judged by the autocorrelation of the losses.
+pub(crate) fn significance(plain: &Losses, with: &Losses) -> f64 {
+    let ratio = plain.iter().sum::<f64>() / with.iter().sum::<f64>() - 1.0;
+    if ratio > 0.0 {
+        (independent(with) * ratio).sqrt()
+    } else {
+        0.0
+    }
+}
+
+/// Number of samples over the sum of their autocorrelations (Bartlett's window).
+fn independent(losses: &Losses) -> f64 {
+    let n = losses.len();
+    if n < 8 {
+        return 1.0;
+    }
+    let mean = losses.iter().sum::<f64>() / n as f64;
+    let lags = (2.0 * (n as f64).sqrt()) as usize;
+    let gamma = |lag: usize| {
+        losses[lag..]
+            .iter()
+            .zip(losses)
+            .map(|(x, y)| (x - mean) * (y - mean))
+            .sum::<f64>()
+    };
+    let variance = gamma(0);
+    if variance <= 0.0 {
+        return 1.0;
+    }
+    let mut time = 1.0;
+    for lag in 1..=lags.min(n - 1) {
+        time += 2.0 * (1.0 - lag as f64 / (lags + 1) as f64) * gamma(lag) / variance;
+    }
+    n as f64 / time.max(1.0)
+}
+
 /// Root of the mean loss: the `nrmse` over the samples that judge.
 pub(crate) fn nrmse(losses: &Losses) -> f64 {
     (losses.iter().sum::<f64>() / losses.len().max(1) as f64).sqrt()

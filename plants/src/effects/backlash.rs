@@ -70,6 +70,7 @@ impl Effect<2, 2> for Backlash {
             .scaled(50.0),
         ],
         states: 2,
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

@@ -35,6 +35,7 @@ impl Effect<1, 0> for ConstantForce {
                 .or(0.0)
                 .scaled(0.3),
         ],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

@@ -57,6 +57,7 @@ impl Effect<2, 0> for CoulombFriction {
             .nonlinear()
             .scaled(0.1),
         ],
+        rarity: 0,
         ..EffectMeta::PLAIN
     };
 

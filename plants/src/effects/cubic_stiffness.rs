@@ -49,6 +49,7 @@ impl Effect<2, 0> for CubicStiffness {
                 .known()
                 .nonlinear(),
         ],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

@@ -60,6 +60,7 @@ impl Effect<3, 0> for EncoderRipple {
                 .known()
                 .nonlinear(),
         ],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

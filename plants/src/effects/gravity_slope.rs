@@ -47,6 +47,7 @@ impl Effect<2, 0> for GravitySlope {
                 .or(0.0)
                 .scaled(0.3),
         ],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

@@ -39,6 +39,7 @@ impl Effect<1, 0> for InputDelay {
                 .scaled(0.01),
         ],
         memory: true,
+        rarity: 0,
         ..EffectMeta::PLAIN
     };
 

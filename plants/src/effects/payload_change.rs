@@ -73,6 +73,7 @@ impl Effect<4, 0> for PayloadChange {
                 .nonlinear()
                 .scaled(0.1),
         ],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

@@ -42,6 +42,7 @@ impl Effect<1, 0> for QuadraticDrag {
         .within(0.0, f64::INFINITY)
         .or(0.0)
         .scaled(0.02)],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

@@ -37,6 +37,7 @@ impl Effect<1, 0> for SensorOffset {
                 .nonlinear()
                 .scaled(0.1),
         ],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

@@ -44,6 +44,7 @@ impl Effect<1, 0> for SensorWindow {
                 .scaled(0.02),
         ],
         memory: true,
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

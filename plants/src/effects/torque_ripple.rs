@@ -54,6 +54,7 @@ impl Effect<3, 0> for TorqueRipple {
                 .scaled(0.1)
                 .starting_at(&COUNTS),
         ],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

@@ -46,6 +46,7 @@ impl Effect<1, 0> for WheelSlip {
         .or(1000.0)
         .nonlinear()
         .starting_at(&[1.5, 3.0, 5.0, 8.0, 12.0, 20.0])],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 

@@ -46,6 +46,7 @@ impl Effect<1, 0> for WindingHeating {
         .within(0.0, 1.0)
         .or(0.0)
         .scaled(0.005)],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 
