@@ -109,7 +109,9 @@ const REPORTED: usize = 12;
 /// Candidates that are fitted to the end.
 const FINALISTS: usize = 10;
 /// Starts of candidates that promise most and are looked at.
-const LOOKED_AT: usize = 30;
+const LOOKED_AT: usize = 40;
+/// Places of one effect among the finalists.
+const SIBLINGS: usize = 2;
 /// Effort of a first look at a candidate.
 const LOOK: Effort = Effort {
     iterations: 10,
@@ -237,9 +239,11 @@ pub(crate) fn diagnose_above(
     let mut judged: Vec<Judged> = Vec::new();
     for k in 0..looked.len() {
         let (i, found) = &looked[k];
+        let id = found.candidate.meta.id;
         // Of several starts of one candidate the best counts, and of an effect and its special case
         // the special case, unless it is worse.
         let again = looked[..k].iter().any(|(j, _)| i == j);
+        let close = |other: &Judged| nrmse(&other.rank) < CLOSE * nrmse(&found.rank);
         let needless = looked.iter().any(|(_, other)| {
             let special = found
                 .candidate
@@ -247,9 +251,18 @@ pub(crate) fn diagnose_above(
                 .simpler
                 .contains(&other.candidate.meta.id)
                 && found.candidate.at == other.candidate.at;
-            special && nrmse(&other.rank) < CLOSE * nrmse(&found.rank)
+            // On a straight run one wheel stands for both: then both.
+            let wider = other.candidate.meta.id == id
+                && found
+                    .candidate
+                    .at
+                    .iter()
+                    .all(|c| other.candidate.at.contains(c))
+                && other.candidate.at.len() > found.candidate.at.len();
+            (special || wider) && close(other)
         });
-        if !again && !needless && judged.len() < FINALISTS {
+        let siblings = judged.iter().filter(|j| j.candidate.meta.id == id).count();
+        if !again && !needless && siblings < SIBLINGS && judged.len() < FINALISTS {
             judged.push(found.clone());
         }
     }
