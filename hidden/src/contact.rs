@@ -55,6 +55,11 @@ impl Tyre {
     /// Shape factor `C`.
     const SHAPE: f64 = 1.3;
 
+    /// Force of fast sliding over the largest force.
+    pub(crate) fn sliding() -> f64 {
+        (Self::SHAPE * std::f64::consts::FRAC_PI_2).sin()
+    }
+
     /// Tractive force at a slip of `slip` m/s under a load of `load` N, N.
     pub(crate) fn force(&self, slip: f64, load: f64) -> f64 {
         self.friction * load * (Self::SHAPE * (slip / self.slip).atan()).sin()

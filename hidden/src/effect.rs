@@ -65,7 +65,7 @@ effects! {
     SensorLag "sensor_lag" Twil "odometry from filtered counts",
     SensorOffset "sensor_offset" Twil "a bias on the measured yaw rate",
     SensorScale "sensor_scale" Twil "a wrong scale on the measured forward speed",
-    WheelRadiusMismatch "wheel_radius_mismatch" Twil "right wheel larger, left one smaller than odometry believes",
+    WheelRadiusMismatch "wheel_radius_mismatch" Twil "measuring wheels, undriven, the right one larger and the left one smaller than odometry believes",
     EncoderRipple "encoder_ripple" Twil "an encoder disc, the right one, that does not turn about its centre",
 }
 

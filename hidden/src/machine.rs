@@ -234,7 +234,7 @@ impl Machine {
                 torque += physics.load.torque(wheel_angle);
             }
             if let Some(tyre) = physics.tyre {
-                let r = physics.wheel_radius[k];
+                let r = physics.body.wheel_radius;
                 let load = 0.5 * self.mass * GRAVITY;
                 let pushed = r * tyre.force(r * (wheel - ground), load);
                 end.wheel[k] += STEP * (torque - pushed) / self.wheel_inertia;

@@ -41,6 +41,8 @@ pub(crate) struct OdometryParts {
     pub(crate) offset: [f64; 2],
     /// Scale of each signal.
     pub(crate) scale: [f64; 2],
+    /// Radius of each measuring wheel over the nominal one.
+    pub(crate) wheel_size: [f64; 2],
     /// Of each disc.
     pub(crate) eccentricity: [Eccentricity; 2],
 }
@@ -63,6 +65,7 @@ impl OdometryParts {
             lag: 0.0,
             offset: [0.0; 2],
             scale: [1.0; 2],
+            wheel_size: [1.0; 2],
             eccentricity: [Eccentricity::default(); 2],
         }
     }
@@ -116,7 +119,7 @@ impl Odometry {
     fn read(&self, angles: [f64; 2]) -> Reading {
         let exact = [0, 1].map(|i| {
             let Eccentricity { amplitude, phase } = self.parts.eccentricity[i];
-            let angle: f64 = angles[i];
+            let angle: f64 = angles[i] / self.parts.wheel_size[i];
             if amplitude == 0.0 {
                 angle
             } else {

@@ -88,8 +88,6 @@ pub(crate) struct Physics {
     /// Centre of mass ahead of the axle, m.
     pub(crate) mass_offset: f64,
     pub(crate) payload: Option<Payload>,
-    /// Radii the wheels really have, m.
-    pub(crate) wheel_radius: [f64; 2],
     pub(crate) odometry: OdometryParts,
 }
 
@@ -116,7 +114,6 @@ impl Physics {
             slope: None,
             mass_offset: 0.0,
             payload: None,
-            wheel_radius: [body.wheel_radius; 2],
             odometry: OdometryParts::new(robot, &body),
         }
     }
@@ -124,10 +121,10 @@ impl Physics {
     /// Velocity of each shaft per velocity of the body: `φ' = J u`, with `u = (v, ω)` of the robot
     /// and the shaft's own speed on the axis.
     pub(crate) fn jacobian(&self) -> [[f64; 2]; 2] {
-        let [r, l] = self.wheel_radius;
+        let r = self.body.wheel_radius;
         let b = self.body.half_track;
         match self.robot {
-            Robot::Twil => [[1.0 / r, b / r], [1.0 / l, -b / l]],
+            Robot::Twil => [[1.0 / r, b / r], [1.0 / r, -b / r]],
             Robot::Axis => [[1.0, 0.0], [0.0, 0.0]],
         }
     }

@@ -54,7 +54,8 @@ pub(super) fn offset(m: &mut Physics, mut of: Concealed) -> Concealed {
         .physical("mass_offset", offset, "m")
 }
 
-/// Tyres with a coefficient of friction of 0.2.
+/// Tyres with a coefficient of friction of 0.2. The limit in volts is that of fast sliding, of a
+/// robot that goes straight on: of the motors' torque the rotors and wheels keep the share `1 - m/M` that accelerates them.
 pub(super) fn slip(m: &mut Physics, mut of: Concealed) -> Concealed {
     let tyre = Tyre {
         friction: 0.2 / of.size,
@@ -62,11 +63,14 @@ pub(super) fn slip(m: &mut Physics, mut of: Concealed) -> Concealed {
     };
     m.tyre = Some(tyre);
     let traction = tyre.friction * 0.5 * m.body.mass * GRAVITY;
-    let limit = traction * m.body.wheel_radius / m.motor.torque_per_volt();
+    let passed_on = m.body.mass / effective(m)[0];
+    let sliding = Tyre::sliding() * traction;
+    let limit = sliding * m.body.wheel_radius / m.motor.torque_per_volt() / passed_on;
     of.approximate = true;
     of.fitted("limit", limit, "V")
         .physical("friction", tyre.friction, "1")
         .physical("largest_traction", traction, "N")
+        .physical("sliding_traction", sliding, "N")
         .physical("slip_scale", tyre.slip, "m/s")
 }
 

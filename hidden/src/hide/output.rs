@@ -49,18 +49,18 @@ pub(super) fn scale(m: &mut Physics, mut of: Concealed) -> Concealed {
     of.fitted("error", share, "1")
 }
 
-/// The right wheel is 5 % larger, the left one 5 % smaller than odometry believes. They also push less
-/// and more: with the mismatch of the counts comes one of the gains.
+/// Undriven measuring wheels, the right one 5 % larger, the left one 5 % smaller than odometry
+/// believes. Of driven wheels of different size encoders would show next to nothing: a larger wheel
+/// turns as fast at the same voltage.
 pub(super) fn radius(m: &mut Physics, mut of: Concealed) -> Concealed {
     of.at = vec!["encoder.right", "encoder.left"];
-    of.approximate = true;
     let share = 0.05 * of.size;
-    m.wheel_radius[0] *= 1.0 + share;
-    m.wheel_radius[1] *= 1.0 - share;
-    let [right, left] = m.wheel_radius;
+    let sizes = [1.0 + share, 1.0 - share];
+    m.odometry.wheel_size = sizes;
+    let radius = m.body.wheel_radius;
     of.fitted("mismatch", share, "1")
-        .physical("radius_right", right, "m")
-        .physical("radius_left", left, "m")
+        .physical("radius_right", radius * sizes[0], "m")
+        .physical("radius_left", radius * sizes[1], "m")
 }
 
 /// The first disc off centre by 4.6° of reading.
