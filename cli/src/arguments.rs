@@ -91,9 +91,10 @@ pub(crate) struct SimulateOptions {
 }
 
 #[derive(Debug, Args)]
+#[command(override_usage = "loopsight compare [OPTIONS] [MODEL] <LOG>")]
 pub(crate) struct CompareOptions {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
-    #[arg(required = true, num_args = 1..=2, value_names = ["MODEL] [LOG"])]
+    #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// JSON on standard output.
     #[arg(long)]
@@ -104,9 +105,10 @@ pub(crate) struct CompareOptions {
 }
 
 #[derive(Debug, Args)]
+#[command(override_usage = "loopsight fit [OPTIONS] [MODEL] <LOG>")]
 pub(crate) struct FitOptions {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
-    #[arg(required = true, num_args = 1..=2, value_names = ["MODEL] [LOG"])]
+    #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// Judge the fitted model on this log, which it was not fitted to.
     #[arg(long, value_name = "LOG2")]
@@ -145,9 +147,10 @@ pub(crate) enum SchemeName {
 }
 
 #[derive(Debug, Args)]
+#[command(override_usage = "loopsight diagnose [OPTIONS] [MODEL] <LOG>")]
 pub(crate) struct DiagnoseOptions {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
-    #[arg(required = true, num_args = 1..=2, value_names = ["MODEL] [LOG"])]
+    #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// Judge on this log; without it, on parts of LOG that the fits do not see.
     #[arg(long, value_name = "LOG2")]
@@ -175,9 +178,10 @@ pub(crate) struct AddOptions {
 }
 
 #[derive(Debug, Args)]
+#[command(override_usage = "loopsight improve [OPTIONS] [MODEL] <LOG>")]
 pub(crate) struct ImproveOptions {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
-    #[arg(required = true, num_args = 1..=2, value_names = ["MODEL] [LOG"])]
+    #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// Judge on this log; without it, on parts of LOG that the fits do not see.
     #[arg(long, value_name = "LOG2")]
