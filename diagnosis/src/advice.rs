@@ -34,6 +34,12 @@ pub(crate) fn advice(
             });
         }
     }
+    if verdict == Conclusion::DataInsufficient {
+        list.push(Advice {
+            why: "the log is explained down to its noise, the test recording is not: what is missing never shows in the log".to_owned(),
+            experiment: "fit to a recording with inputs like those of the test recording: several levels, slow ramps through zero, rests, both directions".to_owned(),
+        });
+    }
     if verdict == Conclusion::UnknownEffect {
         list.push(Advice {
             why: "no effect of the library explains what the model does not".to_owned(),

@@ -142,6 +142,8 @@ const COMPLETE: f64 = 1.2;
 pub(crate) const LEAST: f64 = 0.004;
 /// Share of what the best explanation leaves above the floor by which a smaller one may be worse.
 const BLUR: f64 = 0.3;
+/// Below this multiple of the floor a log explains itself.
+const BLIND: f64 = 1.3;
 /// Above this multiple of the floor something must be missing.
 const ABOVE_FLOOR: f64 = 1.5;
 
@@ -290,8 +292,13 @@ pub(crate) fn diagnose_above(
         let matters = complete || explained > (MATTERS * floor).max(least);
         (earned && significance > SIGNIFICANT && matters).then(|| explanations[0].place.clone())
     });
+    // The log explains itself and the test does not: what is missing never showed in the log.
+    let floor_fit = self::floor(model, runs);
+    let blind =
+        test.is_some() && nominal_fit < BLIND * floor_fit && nominal_error > ABOVE_FLOOR * floor;
     let verdict = match &missing {
         Some(_) => Conclusion::EffectMissing,
+        None if blind => Conclusion::DataInsufficient,
         None if nominal_error > ABOVE_FLOOR * floor => Conclusion::UnknownEffect,
         None => Conclusion::NothingMissing,
     };

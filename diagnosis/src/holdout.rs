@@ -85,13 +85,14 @@ impl<'a> Holdout<'a> {
         }
     }
 
-    /// Losses that candidates are ranked by: those of [`Holdout::judge`], and where there is no test
-    /// recording also those on what was seen. A transient happens once in a run: whether it was
+    /// Losses that candidates are ranked by: those of [`Holdout::judge`] and those on what was seen. A transient happens once in a run: whether it was
     /// explained must count, wherever it falls. A handful of parameters more cannot fake that on
     /// thousands of samples.
     pub(crate) fn rank(&self, model: &Model, solution: &Solution, judged: &Losses) -> Losses {
         if self.test.is_some() {
-            return judged.clone();
+            let mut all = judged.clone();
+            all.extend(self.fitted(model, solution));
+            return all;
         }
         let (values, states) = (&solution.values, &solution.states);
         losses(model, values, states, self.runs, &self.std_test, None)

@@ -1,0 +1,232 @@
+//! The blind table: recordings that hide an effect, and what a diagnosis finds in them.
+//!
+//! `cargo run --release -p loopsight-tests --example blind_table -- [--sizes 0.5,1,2]
+//! [--experiments prbs,mixed] [--seeds 2] [--clean 20] [--only coulomb_friction] [--write FILE]`
+//!
+//! Judged on a multi-level recording of the same machine with other seeds. The machine's windings
+//! have a time constant of 0.1 ms, far below what can be seen; everything else about it is
+//! independent of the models that are fitted.
+
+use std::fmt::Write as _;
+
+use loopsight_core::model::Model;
+use loopsight_diagnosis::{Conclusion, Diagnosis, diagnose};
+use loopsight_hidden::{Experiment, Hidden, Robot, record_with, refit};
+use loopsight_plants as _;
+use rayon::prelude::*;
+
+/// Windings of a motor with an ironless rotor, s.
+const WINDINGS: f64 = 1e-4;
+
+/// A refit of the plain model leaves less than this multiple of the floor: nothing shows.
+const INVISIBLE: f64 = 1.15;
+
+struct Row {
+    what: String,
+    experiment: Experiment,
+    size: f64,
+    seed: u64,
+    right: bool,
+    found: String,
+    before: f64,
+    after: f64,
+    floor: f64,
+    parameters: String,
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let value = |name: &str, default: &str| -> String {
+        let at = arguments.iter().position(|a| a == name);
+        at.and_then(|i| arguments.get(i + 1))
+            .map_or_else(|| default.to_owned(), Clone::clone)
+    };
+    let list = |name: &str, default: &str| -> Vec<String> {
+        value(name, default).split(',').map(str::to_owned).collect()
+    };
+    let sizes: Vec<f64> = list("--sizes", "0.5,1,2")
+        .iter()
+        .filter_map(|s| s.parse().ok())
+        .collect();
+    let experiments: Vec<Experiment> = Experiment::ALL
+        .into_iter()
+        .filter(|e| {
+            list("--experiments", "prbs,mixed")
+                .iter()
+                .any(|n| n == e.name())
+        })
+        .collect();
+    let seeds: u64 = value("--seeds", "2").parse().unwrap_or(2);
+    let clean: u64 = value("--clean", "20").parse().unwrap_or(20);
+    let only = value("--only", "");
+
+    let mut jobs: Vec<(Option<Hidden>, Experiment, f64, u64)> = Vec::new();
+    for effect in Hidden::ALL {
+        if !only.is_empty() && !only.split(',').any(|o| o == effect.id()) {
+            continue;
+        }
+        for experiment in &experiments {
+            for size in &sizes {
+                for seed in 1..=seeds {
+                    jobs.push((Some(*effect), *experiment, *size, seed));
+                }
+            }
+        }
+    }
+    if only.is_empty() {
+        for seed in 0..clean {
+            let experiment = experiments[seed as usize % experiments.len()];
+            jobs.push((None, experiment, 0.0, 100 + seed));
+        }
+    }
+    let rows: Vec<Row> = jobs
+        .par_iter()
+        .filter_map(|(effect, experiment, size, seed)| {
+            let row = try_one(*effect, *experiment, *size, *seed)?;
+            eprintln!(
+                "{} {:22} {:6} size {:3} seed {:3}: {:60} {:6.2} -> {:6.2} floor {:5.2} {}",
+                if row.right { "ok   " } else { "WRONG" },
+                row.what,
+                row.experiment.name(),
+                row.size,
+                row.seed,
+                row.found,
+                100.0 * row.before,
+                100.0 * row.after,
+                100.0 * row.floor,
+                row.parameters
+            );
+            Some(row)
+        })
+        .collect();
+    let table = render(&rows);
+    println!("{table}");
+    let file = value("--write", "");
+    if !file.is_empty() {
+        match std::fs::write(&file, &table) {
+            Ok(()) => eprintln!("wrote {file}"),
+            Err(error) => eprintln!("{file}: {error}"),
+        }
+    }
+}
+
+fn try_one(effect: Option<Hidden>, experiment: Experiment, size: f64, seed: u64) -> Option<Row> {
+    let robot = effect.map_or(Robot::Twil, Hidden::home);
+    let hidden: Vec<(Hidden, f64)> = effect.map(|e| (e, size)).into_iter().collect();
+    let log = record_with(robot, &hidden, experiment, seed, WINDINGS).ok()?;
+    let test = record_with(
+        robot,
+        &hidden,
+        Experiment::MultiLevel,
+        1000 + seed,
+        WINDINGS,
+    )
+    .ok()?;
+    let (model, _) = Model::from_toml("hidden", &log.model_toml).ok()?;
+    let runs = [log.run.clone()];
+    let tests = [test.run.clone()];
+    let diagnosis = diagnose(&model, &runs, Some(&tests), &[], &|_, _| {}).ok()?;
+    let what = effect.map_or("clean", Hidden::id);
+    let truth = log.truth.hidden.first();
+    let right = match truth {
+        None => diagnosis.verdict == Conclusion::NothingMissing,
+        // Where the log cannot show the effect at all, the right answer is to say so.
+        Some(_) if diagnosis.verdict == Conclusion::DataInsufficient => {
+            refit(&log).left(&log) < INVISIBLE * log.floor()
+        }
+        // A scale of a sensor is a scale of the gain: no velocity log can show it.
+        Some(truth) if truth.effect == Hidden::SensorScale => {
+            diagnosis.verdict == Conclusion::NothingMissing
+        }
+        Some(truth) => named(&diagnosis, truth.effect.id(), &truth.at),
+    };
+    let best = diagnosis.candidates.first();
+    let found = match (&diagnosis.missing, best) {
+        (Some(place), Some(best)) => format!(
+            "{}@{}{}",
+            place.effect,
+            place.at.join("+"),
+            if best.indistinguishable_from.is_empty() {
+                String::new()
+            } else {
+                format!(" (class of {})", best.indistinguishable_from.len() + 1)
+            }
+        ),
+        _ => format!("{:?}", diagnosis.verdict),
+    };
+    let parameters = match (truth, best) {
+        (Some(truth), Some(best)) => truth
+            .fitted
+            .iter()
+            .filter_map(|q| {
+                let estimate = best.parameters.get(q.name)?;
+                Some(format!(
+                    "{} {:.4} (true {:.4})",
+                    q.name, estimate.value, q.value
+                ))
+            })
+            .collect::<Vec<_>>()
+            .join(", "),
+        _ => String::new(),
+    };
+    Some(Row {
+        what: what.to_owned(),
+        experiment,
+        size,
+        seed,
+        right,
+        found,
+        before: diagnosis.nominal.nrmse,
+        after: if diagnosis.missing.is_some() {
+            best.map_or(f64::NAN, |b| b.nrmse)
+        } else {
+            diagnosis.nominal.nrmse
+        },
+        floor: test.floor(),
+        parameters,
+    })
+}
+
+/// Whether the missing effect, or one that the diagnosis says it cannot tell from it, is the true
+/// one at the true channels.
+fn named(diagnosis: &Diagnosis, id: &str, at: &[&str]) -> bool {
+    let (Some(missing), Some(best)) = (&diagnosis.missing, diagnosis.candidates.first()) else {
+        return false;
+    };
+    let mut class = vec![missing];
+    class.extend(&best.indistinguishable_from);
+    class.iter().any(|p| {
+        p.effect == id && p.at.len() == at.len() && at.iter().all(|c| p.at.iter().any(|x| x == c))
+    })
+}
+
+fn render(rows: &[Row]) -> String {
+    let mut text =
+        String::from("| hidden | right | error before | after | floor |\n|---|---|---|---|---|\n");
+    let mut names: Vec<&str> = rows.iter().map(|r| r.what.as_str()).collect();
+    names.dedup();
+    for name in names {
+        let of: Vec<&Row> = rows.iter().filter(|r| r.what == name).collect();
+        let mean = |f: &dyn Fn(&Row) -> f64| of.iter().map(|r| f(r)).sum::<f64>() / of.len() as f64;
+        let _ = writeln!(
+            text,
+            "| {name} | {}/{} | {:.2} % | {:.2} % | {:.2} % |",
+            of.iter().filter(|r| r.right).count(),
+            of.len(),
+            100.0 * mean(&|r| r.before),
+            100.0 * mean(&|r| r.after),
+            100.0 * mean(&|r| r.floor),
+        );
+    }
+    let hidden: Vec<&Row> = rows.iter().filter(|r| r.what != "clean").collect();
+    let clean: Vec<&Row> = rows.iter().filter(|r| r.what == "clean").collect();
+    let _ = writeln!(
+        text,
+        "\nRight effect or class: {} of {}. False alarms on clean recordings: {} of {}.",
+        hidden.iter().filter(|r| r.right).count(),
+        hidden.len(),
+        clean.iter().filter(|r| !r.right).count(),
+        clean.len()
+    );
+    text
+}
