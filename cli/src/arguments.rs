@@ -34,6 +34,8 @@ pub(crate) enum Command {
     Fit(FitOptions),
     /// Find out which physical effect a model lacks.
     Diagnose(DiagnoseOptions),
+    /// Plan the experiment that separates two effects or pins a parameter.
+    Experiment(ExperimentOptions),
     /// Add an effect to a model file, with neutral parameters.
     Add(AddOptions),
     /// Diagnose, add, refit, until nothing more is missing.
@@ -161,6 +163,36 @@ pub(crate) struct DiagnoseOptions {
     /// Write a page with pictures; opens offline in any browser.
     #[arg(long, value_name = "FILE")]
     pub(crate) html: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExperimentOptions {
+    /// Model file, with values: the experiment is planned around them.
+    pub(crate) model: PathBuf,
+    /// Two effects to tell apart, each as `EFFECT` or `EFFECT@CHANNEL+CHANNEL`; `nothing` as the
+    /// second asks whether the first is there at all.
+    #[arg(long, num_args = 2, value_names = ["EFFECT_A", "EFFECT_B"])]
+    pub(crate) separate: Vec<String>,
+    /// A parameter to find to 1 %, by its name in the model; without it and without --separate,
+    /// all parameters that a fit estimates.
+    #[arg(long, value_name = "PARAMETER", conflicts_with = "separate")]
+    pub(crate) pin: Option<String>,
+    /// Length of the experiment; by default as long as the question needs, 5 s to 600 s.
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) duration: Option<f64>,
+    /// Largest magnitude of every input, in its SI unit; by default 9, or the limit of an
+    /// `input_saturation` of the model where that is less.
+    #[arg(long, value_name = "VOLTS")]
+    pub(crate) limit: Option<f64>,
+    /// Sampling period of the robot's log.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.01)]
+    pub(crate) period: f64,
+    /// The input sequence to write (CSV); a key `inputs_from` of an experiment file replays it.
+    #[arg(short, long, value_name = "PLAN")]
+    pub(crate) output: PathBuf,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

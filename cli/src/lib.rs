@@ -62,6 +62,7 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         Command::Compare(options) => commands::compare::run(options),
         Command::Fit(options) => commands::fit::run(options),
         Command::Diagnose(options) => commands::diagnose::run(options),
+        Command::Experiment(options) => commands::experiment::run(options),
         Command::Add(options) => commands::add::run(options),
         Command::Improve(options) => commands::improve::run(options),
         Command::Run(options) => commands::run::run(options),

@@ -67,7 +67,7 @@ const WIDTH: f64 = 0.02;
 
 /// Gives the last effect of `model` the widths that suit the recording; returns the root mean
 /// square of the flow at its channels.
-fn suit(model: &mut Model, meta: &EffectMeta, rms: &[f64]) -> f64 {
+pub(crate) fn suit(model: &mut Model, meta: &EffectMeta, rms: &[f64]) -> f64 {
     let Some(effect) = model.effects.last() else {
         return 0.0;
     };
@@ -86,7 +86,7 @@ fn suit(model: &mut Model, meta: &EffectMeta, rms: &[f64]) -> f64 {
     flow
 }
 
-fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<&'static str>> {
+pub(crate) fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<&'static str>> {
     let fitting: Vec<&'static Channel> = model
         .plant
         .channels

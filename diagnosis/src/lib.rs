@@ -5,6 +5,7 @@ mod advice;
 mod candidates;
 mod compare;
 mod diagnose;
+mod experiment;
 pub mod fit;
 mod flatness;
 mod floor;
@@ -25,6 +26,9 @@ mod where_it_fails;
 pub use advice::Advice;
 pub use compare::{CompareError, Comparison, RunTrace, SignalTrace, compare};
 pub use diagnose::{Conclusion, Diagnosis, Explanation, Level, Place, diagnose};
+pub use experiment::{
+    Considered, Drive, Limits, Plan, Promise, Question, QuestionError, experiment, place,
+};
 pub use fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
 pub use improve::{Improvement, Step, improve};
 pub use regression::{Regression, Scheme};

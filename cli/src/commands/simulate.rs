@@ -28,6 +28,10 @@ pub(crate) struct Experiment {
     /// Inputs by id; 0 where none is given.
     #[serde(default)]
     pub(crate) inputs: BTreeMap<String, Excitation>,
+    /// A CSV of inputs to replay instead, beside this file: columns named as in a log, each row
+    /// held until the next.
+    #[serde(default)]
+    pub(crate) inputs_from: Option<String>,
     /// The robot's integration step, noise, seed, limits: the settings of the driver `simulated`.
     #[serde(default)]
     pub(crate) robot: Simulated,
@@ -59,6 +63,10 @@ impl Experiment {
                 "the robot's model is the MODEL of the command, so none can be named here";
             return Err(source.error(&["robot".into(), "model".into()], message, None));
         }
+        if experiment.inputs_from.is_some() && !experiment.inputs.is_empty() {
+            let message = "there are `inputs` as well, expected one of the two";
+            return Err(source.error(&["inputs_from".into()], message, None));
+        }
         Ok(experiment)
     }
 
@@ -66,11 +74,55 @@ impl Experiment {
     pub(crate) fn simulate(&self, source: &Source, model: &Model) -> Result<Run, Box<ConfigError>> {
         let steps = (self.duration_s / self.period_s + 1e-9).floor() as usize;
         let time: Vec<f64> = (0..=steps).map(|k| k as f64 * self.period_s).collect();
-        let inputs = excitation::build(&self.inputs, model.plant.inputs)
-            .map_err(|e| placed(source, &["inputs".into()], e))?;
-        simulate_inputs(model, &self.robot, &time, &sample_rows(&inputs, &time))
+        let rows = match &self.inputs_from {
+            Some(name) => replayed(source, name, model, &time)?,
+            None => {
+                let inputs = excitation::build(&self.inputs, model.plant.inputs)
+                    .map_err(|e| placed(source, &["inputs".into()], e))?;
+                sample_rows(&inputs, &time)
+            }
+        };
+        simulate_inputs(model, &self.robot, &time, &rows)
             .map_err(|e| placed(source, &["robot".into()], e))
     }
+}
+
+/// The inputs that the CSV `name`, beside the experiment file, holds at the instants `time`; 0
+/// before its first row.
+fn replayed(
+    source: &Source,
+    name: &str,
+    model: &Model,
+    time: &[f64],
+) -> Result<Vec<f64>, Box<ConfigError>> {
+    let path = Path::new(&source.file).with_file_name(name);
+    let wrong = |why: String| {
+        let why = format!("{}: {why}", path.display());
+        source.error(&["inputs_from".into()], &why, None)
+    };
+    let log = loopsight_recordings::read(&path).map_err(|e| wrong(e.to_string()))?;
+    let table = log.table();
+    let column = |name: String| {
+        let found = table.columns.iter().position(|c| c.text == name);
+        found.ok_or_else(|| wrong(format!("there is no column `{name}`")))
+    };
+    let stamp = column("time_s".to_owned())?;
+    let inputs = model
+        .plant
+        .inputs
+        .iter()
+        .map(|signal| column(header(signal)));
+    let inputs: Vec<usize> = inputs.collect::<Result<_, _>>()?;
+    let rows = table.runs.iter().flat_map(|run| &run.rows);
+    let values: Vec<f64> = rows.copied().collect();
+    let rows: Vec<&[f64]> = values.chunks_exact(table.columns.len()).collect();
+    let replay = time.iter().flat_map(|t| {
+        // Stamps are rounded sums of periods.
+        let come = rows.partition_point(|row| row[stamp] <= t + 1e-9);
+        let row = come.checked_sub(1).map(|k| rows[k]);
+        inputs.iter().map(move |i| row.map_or(0.0, |row| row[*i]))
+    });
+    Ok(replay.collect())
 }
 
 pub(crate) fn run(options: &SimulateOptions) -> Result<(), Failure> {

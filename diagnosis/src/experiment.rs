@@ -1,0 +1,479 @@
+//! Which experiment would tell: inputs that separate two effects, or that pin a parameter.
+//!
+//! Two effects are separated by the inputs under which the one, fitted as well as it can be to a
+//! robot that has the other, stays farthest from it (T-optimality), whichever of the two is true:
+//!
+//! ```text
+//! d²(u) = min over { A true, B fitted; B true, A fitted } of  min_θ Σ_k |(y(k) - ŷ(k, θ))/σ|²
+//! u*    = argmax d²(u)      over a fixed list of inputs within the limits
+//! ```
+//!
+//! with `y` the noise-free response of the model with an effect of noticeable size, `θ` all free
+//! parameters of the model and of the rival, and `σ` the noise of the sensors. `d` is the number of
+//! standard deviations by which two models known in every number would be told apart in white
+//! noise. A recording must also say what the noise is and leave data to judge by, so that an
+//! experiment is made long enough for `d = 20` rather than for the 5 of a single test.
+//!
+//! A parameter is pinned by the inputs that make its standard error least (c-optimality),
+//! `sqrt(cᵀ (JᵀJ)⁻¹ c)` with `J` the exact sensitivities over `σ`; without a question, those that
+//! make the largest relative standard error of all parameters least.
+//!
+//! Assumptions: the model's values are near enough for its response to be; the robot starts at rest;
+//! the noise is white (that of encoder counts is smaller at low frequencies, so this is on the safe
+//! side); the chosen inputs are the best of a list, not of all there are.
+//!
+//! References: A. C. Atkinson, V. V. Fedorov (1975), "The design of experiments for discriminating
+//! between two rival models", Biometrika 62, 57–70; A. C. Atkinson, A. N. Donev (1992), "Optimum
+//! Experimental Designs", chapters 10 (c-, D-optimality) and 20 (T-optimality); L. Ljung (1999),
+//! "System Identification: Theory for the User", 2nd edition, chapter 13.
+
+mod question;
+mod rival;
+mod shapes;
+
+use loopsight_core::model::Model;
+use loopsight_core::registry::BuildError;
+use loopsight_core::sensor::Sensor;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::Place;
+use crate::prediction::signal_rms;
+pub use question::{QuestionError, place};
+use question::{Rivals, rivals};
+use rival::{information, response, rival, standard_errors};
+use shapes::Shape;
+
+/// What an experiment is to answer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Question {
+    /// Which of two effects it is; `None`: whether it is there at all.
+    Separate(Place, Option<Place>),
+    /// The value of a parameter, by its name in the model.
+    Pin(String),
+    /// The values of all parameters that a fit estimates.
+    All,
+}
+
+/// What the robot allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Largest magnitude of every input, in its SI unit.
+    pub limit: f64,
+    /// Sampling period, s.
+    pub period: f64,
+    /// Length of the experiment, s; `None`: as long as it must be.
+    pub duration: Option<f64>,
+}
+
+/// What an experiment promises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Promise {
+    /// It answers the question.
+    Answers,
+    /// It would have to be longer.
+    TooShort,
+    /// No inputs answer the question.
+    CannotBeSeparated,
+}
+
+/// An experiment that was looked at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Considered {
+    /// What it is.
+    pub experiment: String,
+    /// As [`Plan::detectability`], after 20 s (or the duration asked for).
+    pub detectability: f64,
+}
+
+/// An experiment, ready to be recorded.
+#[derive(Clone, Debug, Serialize)]
+pub struct Plan {
+    /// What it is; empty when no inputs answer the question.
+    pub experiment: String,
+    /// How long it takes, s.
+    pub duration_s: f64,
+    /// How long it has to take, s; infinite when no length is enough.
+    pub needed_s: f64,
+    /// The effects it separates.
+    pub separates: Vec<Place>,
+    /// The parameters it pins.
+    pub pins: Vec<String>,
+    /// Effects: their distance in standard deviations. Parameters: value (or noticeable change, if
+    /// larger or the value is zero) over the predicted standard error.
+    pub detectability: f64,
+    /// What it promises.
+    pub verdict: Promise,
+    /// Why this one, in words.
+    pub reason: String,
+    /// What was looked at, best first.
+    pub considered: Vec<Considered>,
+    /// The inputs over time.
+    #[serde(skip)]
+    pub drive: Drive,
+}
+
+/// Inputs over time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Drive {
+    /// Instants, s.
+    pub time: Vec<f64>,
+    /// Inputs from each instant to the next, row by row.
+    pub inputs: Vec<f64>,
+}
+
+/// Length at which experiments are compared, s.
+const HORIZON: f64 = 20.0;
+/// Shortest and longest experiment, s.
+const LENGTHS: (f64, f64) = (5.0, 600.0);
+/// Distance at which effects count as separated.
+const SEPARATED: f64 = 20.0;
+/// Value over standard error at which a parameter counts as pinned.
+const PINNED: f64 = 100.0;
+/// Share of an effect's own distance that a rival must leave: below it the models are the same but
+/// for the errors of their integration, and no robot is its model to that precision.
+const SAME: f64 = 0.02;
+/// Gauss–Newton steps at the first look, and for the best.
+const STEPS: (usize, usize) = (2, 8);
+/// Experiments that are looked at twice.
+const BEST: usize = 6;
+/// Longest integration step, s: far below what any sensor sees.
+const LOOK_STEP: f64 = 0.005;
+/// Noise of a sensor that says nothing about it, as a share of the signal's standard deviation.
+const NOISE: f64 = 0.01;
+
+/// Finds the experiment that answers `question` about `model`, within `limits`.
+///
+/// # Errors
+///
+/// [`QuestionError`] when the question or the limits make no sense for this model.
+pub fn experiment(
+    model: &Model,
+    question: &Question,
+    limits: &Limits,
+) -> Result<Plan, QuestionError> {
+    question::check(model, limits)?;
+    let mut model = model.clone();
+    model.max_step = model
+        .max_step
+        .max(LOOK_STEP)
+        .min(limits.period.max(model.max_step));
+    let design = Design::new(&model, *limits)?;
+    match question {
+        Question::Separate(a, b) => {
+            design.separate(&rivals(&model, a, b.as_ref(), &design.rms, limits.limit)?)
+        }
+        Question::Pin(name) => design.pin(&[question::parameter(&model, name)?], true),
+        Question::All => {
+            let free: Vec<usize> = (0..model.parameters.len())
+                .filter(|i| model.parameters[*i].free)
+                .collect();
+            design.pin(&free, false)
+        }
+    }
+}
+
+struct Design<'m> {
+    model: &'m Model,
+    limits: Limits,
+    names: Vec<&'static str>,
+    /// Of the sensors.
+    noise: Vec<f64>,
+    /// Of the plant's signals under the usual experiment.
+    rms: Vec<f64>,
+}
+
+impl<'m> Design<'m> {
+    fn new(model: &'m Model, limits: Limits) -> Result<Self, QuestionError> {
+        let names: Vec<&'static str> = model.plant.inputs.iter().map(|s| s.id).collect();
+        let drive =
+            Shape::usual(names.len()).drive(&names, limits.limit, limits.period, HORIZON)?;
+        let values = model.values();
+        let run = response(model, &values, &drive);
+        let noise = (0..run.n_measured)
+            .map(|i| match &model.measured[i].sensor {
+                Sensor::EncoderCounts(encoder) => encoder.noise(limits.period),
+                Sensor::Instantaneous | Sensor::IntervalMean => {
+                    let power = (0..run.len())
+                        .map(|k| run.sample(k)[i].powi(2))
+                        .sum::<f64>();
+                    let std = (power / run.len().max(1) as f64).sqrt();
+                    if std > 0.0 { NOISE * std } else { NOISE }
+                }
+            })
+            .collect();
+        let x0 = nalgebra::DVector::zeros(model.n_states());
+        let rms = signal_rms(model, &values, &[x0], &[run]);
+        if rms.iter().any(|v| !v.is_finite()) {
+            return Err(QuestionError::Unstable);
+        }
+        Ok(Self {
+            model,
+            limits,
+            names,
+            noise,
+            rms,
+        })
+    }
+
+    fn drive(&self, shape: Shape, duration: f64) -> Result<Drive, BuildError> {
+        shape.drive(&self.names, self.limits.limit, self.limits.period, duration)
+    }
+
+    /// Squared distances over time, the least of those of the directions; and the share of the
+    /// effect's own distance that this is.
+    fn distance(&self, rivals: &Rivals, drive: &Drive, steps: usize, starts: usize) -> Apart {
+        let of = |truth: &(Model, Vec<f64>), other: &(Model, Vec<Vec<f64>>)| {
+            let run = response(&truth.0, &truth.1, drive);
+            let least = |model: &Model, from: &[Vec<f64>]| {
+                from.iter()
+                    .take(starts)
+                    .map(|start| rival(model, start, &run, &self.noise, steps))
+                    .min_by(|a, b| a.total.total_cmp(&b.total))
+            };
+            let own = rival(self.model, &self.model.values(), &run, &self.noise, steps);
+            let far = least(&other.0, &other.1).filter(|d| d.total < own.total);
+            let own_total = own.total;
+            let far = far.unwrap_or(own);
+            let share = if own_total > 0.0 {
+                (far.total / own_total).sqrt()
+            } else {
+                0.0
+            };
+            Apart {
+                by_sample: far.by_sample,
+                total: far.total,
+                share,
+            }
+        };
+        rivals
+            .directions
+            .iter()
+            .map(|way| of(&way.truth, &way.rival))
+            .min_by(|a, b| a.total.total_cmp(&b.total))
+            .unwrap_or_default()
+    }
+
+    fn separate(&self, rivals: &Rivals) -> Result<Plan, QuestionError> {
+        let horizon = self.limits.duration.unwrap_or(HORIZON);
+        let look = |shapes: &[Shape], steps: usize, starts: usize| {
+            let mut all: Vec<(Shape, Apart)> = shapes
+                .par_iter()
+                .map(|shape| {
+                    let drive = self.drive(*shape, horizon)?;
+                    Ok((*shape, self.distance(rivals, &drive, steps, starts)))
+                })
+                .collect::<Result<_, BuildError>>()?;
+            all.sort_by(|a, b| b.1.total.total_cmp(&a.1.total));
+            Ok::<_, BuildError>(all)
+        };
+        let first = look(&Shape::all(self.names.len()), STEPS.0, 1)?;
+        let best: Vec<Shape> = first.iter().take(BEST).map(|(shape, _)| *shape).collect();
+        let second = look(&best, STEPS.1, usize::MAX)?;
+        let considered: Vec<Considered> = second
+            .iter()
+            .chain(first.iter().skip(BEST))
+            .map(|(shape, apart)| Considered {
+                experiment: shape.name(),
+                detectability: apart.total.sqrt(),
+            })
+            .collect();
+        let Some((shape, mut apart)) = second.into_iter().next() else {
+            return Err(QuestionError::NoInput);
+        };
+        let mut needed = self.needed(&apart, horizon);
+        let mut duration = horizon;
+        let same = apart.share < SAME || needed.is_infinite();
+        if self.limits.duration.is_none() && !same {
+            // Refitted to a shorter recording a rival comes closer: once more at the new length.
+            for _ in 0..3 {
+                duration = needed.clamp(LENGTHS.0, LENGTHS.1).ceil();
+                apart = self.distance(rivals, &self.drive(shape, duration)?, STEPS.1, usize::MAX);
+                needed = self.needed(&apart, duration);
+                if apart.total.sqrt() >= SEPARATED || duration >= LENGTHS.1 {
+                    break;
+                }
+            }
+        }
+        let detectability = apart.total.sqrt();
+        let names = rivals.names();
+        let (verdict, reason) = if same {
+            (Promise::CannotBeSeparated, rivals.inseparable(apart.share))
+        } else if detectability >= SEPARATED {
+            (
+                Promise::Answers,
+                format!(
+                    "{}: fitted as well as it can be, {names} stay {detectability:.0} standard deviations of the sensors' noise apart within {duration:.0} s, at noticeable sizes ({})",
+                    shape.name(),
+                    rivals.sizes,
+                ),
+            )
+        } else {
+            (
+                Promise::TooShort,
+                format!(
+                    "{}: the best found, but {names} come only {detectability:.1} standard deviations of the sensors' noise apart in {duration:.0} s, {SEPARATED} are needed to be sure: that takes about {needed:.0} s, a larger effect than {} or a finer sensor",
+                    shape.name(),
+                    rivals.sizes,
+                ),
+            )
+        };
+        let drive = if same {
+            Drive::default()
+        } else {
+            self.drive(shape, duration)?
+        };
+        Ok(Plan {
+            experiment: if same { String::new() } else { shape.name() },
+            duration_s: if same { 0.0 } else { duration },
+            needed_s: if same { f64::INFINITY } else { needed },
+            separates: rivals.places.clone(),
+            pins: Vec::new(),
+            detectability,
+            verdict,
+            reason,
+            considered,
+            drive,
+        })
+    }
+
+    /// When the accumulated distance is enough, s.
+    fn needed(&self, apart: &Apart, horizon: f64) -> f64 {
+        let enough = SEPARATED * SEPARATED;
+        let mut sum = 0.0;
+        for (k, squared) in apart.by_sample.iter().enumerate() {
+            sum += squared;
+            if sum >= enough {
+                return k as f64 * self.limits.period + 1.0;
+            }
+        }
+        if sum > 0.0 && sum.is_finite() {
+            horizon * enough / sum
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// `asked` are the parameters by index; `strict`: to a share of the value, however small.
+    fn pin(&self, asked: &[usize], strict: bool) -> Result<Plan, QuestionError> {
+        let parameters = &self.model.parameters;
+        if asked.is_empty() {
+            return Err(QuestionError::NothingFree);
+        }
+        let free: Vec<usize> = (0..parameters.len())
+            .filter(|i| parameters[*i].free || asked.contains(i))
+            .collect();
+        let values = self.model.values();
+        let reference = |i: usize| {
+            let (value, scale) = (values[i].abs(), parameters[i].scale());
+            if value == 0.0 || (!strict && value < scale) {
+                scale
+            } else {
+                value
+            }
+        };
+        // The largest relative standard error, and whose it is.
+        let worst = |drive: &Drive| -> (f64, usize) {
+            let errors =
+                standard_errors(&information(self.model, &values, drive, &free, &self.noise));
+            free.iter()
+                .zip(&errors)
+                .filter(|(i, _)| asked.contains(i))
+                .map(|(i, e)| (e * parameters[*i].scale() / reference(*i), *i))
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+                .unwrap_or((f64::INFINITY, asked[0]))
+        };
+        let horizon = self.limits.duration.unwrap_or(HORIZON);
+        let mut all: Vec<(Shape, (f64, usize))> = Shape::all(self.names.len())
+            .par_iter()
+            .map(|shape| Ok((*shape, worst(&self.drive(*shape, horizon)?))))
+            .collect::<Result<_, BuildError>>()?;
+        all.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let considered = all
+            .iter()
+            .map(|(shape, (error, _))| Considered {
+                experiment: shape.name(),
+                detectability: 1.0 / error,
+            })
+            .collect();
+        let Some((shape, (mut error, mut at))) = all.first().copied() else {
+            return Err(QuestionError::NoInput);
+        };
+        let hopeless = !error.is_finite();
+        let mut duration = horizon;
+        let needed = |error: f64, duration: f64| duration * (error * PINNED).powi(2);
+        if self.limits.duration.is_none() && !hopeless {
+            for _ in 0..3 {
+                duration = needed(error, duration).clamp(LENGTHS.0, LENGTHS.1).ceil();
+                (error, at) = worst(&self.drive(shape, duration)?);
+                if error * PINNED <= 1.0 || duration >= LENGTHS.1 {
+                    break;
+                }
+            }
+        }
+        let parameter = &parameters[at];
+        let name = &parameter.name;
+        let standard_error = error * reference(at);
+        let (verdict, reason) = if hopeless {
+            (
+                Promise::CannotBeSeparated,
+                format!(
+                    "{name} cannot be pinned with inputs alone: with the signals that are measured it has no influence of its own under any of the experiments; hold another parameter that does the same at a measured value, or add a sensor"
+                ),
+            )
+        } else {
+            let least = if asked.len() > 1 {
+                format!("the least certain parameter, {name},")
+            } else {
+                name.clone()
+            };
+            let text = format!(
+                "{}: {least} gets a standard error of {standard_error:.2e} {} ({:.2} % of {:.4}) in {duration:.0} s",
+                shape.name(),
+                parameter.unit,
+                100.0 * error,
+                reference(at),
+            );
+            // The prediction is no better than that.
+            if error * PINNED <= 1.1 {
+                (Promise::Answers, text)
+            } else {
+                let long = needed(error, duration);
+                (
+                    Promise::TooShort,
+                    format!("{text}; one of 1 % takes about {long:.0} s"),
+                )
+            }
+        };
+        Ok(Plan {
+            experiment: if hopeless {
+                String::new()
+            } else {
+                shape.name()
+            },
+            duration_s: if hopeless { 0.0 } else { duration },
+            needed_s: needed(error, duration),
+            separates: Vec::new(),
+            pins: asked.iter().map(|i| parameters[*i].name.clone()).collect(),
+            detectability: 1.0 / error,
+            verdict,
+            reason,
+            considered,
+            drive: if hopeless {
+                Drive::default()
+            } else {
+                self.drive(shape, duration)?
+            },
+        })
+    }
+}
+
+/// What is left between two models.
+#[derive(Clone, Debug, Default)]
+struct Apart {
+    by_sample: Vec<f64>,
+    total: f64,
+    /// Of the effect's own distance from the model without any.
+    share: f64,
+}
