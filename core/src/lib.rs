@@ -46,6 +46,8 @@ pub mod loop_file;
 #[cfg(feature = "std")]
 pub mod model;
 #[cfg(feature = "std")]
+mod observe;
+#[cfg(feature = "std")]
 pub mod registry;
 #[cfg(feature = "std")]
 pub mod regression;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 pub use crate::affine::Affine;
@@ -12,10 +12,7 @@ use crate::config::{ConfigError, ReadError, Source, Step, nearest, read_text};
 use crate::registry::{AnyDynamics, AnyPhysics, EffectPart, HostReal, PlantPart};
 use crate::run::LogMap;
 use crate::sensor::Sensor;
-use crate::{
-    Channel, DUAL_WIDTH, Dual, EffectMeta, Parameter, Place, PlantMeta, Real, Role, Signal,
-    derivative, variable,
-};
+use crate::{Channel, EffectMeta, Parameter, Place, PlantMeta, Role, Signal};
 
 /// A model file, as written.
 #[derive(Debug, Serialize, Deserialize)]
@@ -427,56 +424,6 @@ impl Model {
         for (index, output) in y[nx + nu..].iter_mut().enumerate() {
             *output = dynamics.output(index, x, u, p);
         }
-    }
-
-    /// Sensitivity of the measured signals to the plant state (measured × states) at `x`, and
-    /// their values there.
-    pub fn measurement_jacobian(&self, values: &[f64], x: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
-        let (nx, nu) = (self.n_states(), self.plant.inputs.len());
-        let mut jacobian = DMatrix::zeros(self.measured.len(), nx);
-        let mut value = DVector::zeros(self.measured.len());
-        let p: Vec<Dual> = self.lower(&values.iter().map(|v| Dual::of(*v)).collect::<Vec<_>>());
-        let u = vec![Dual::of(0.0); nu];
-        let mut y = vec![Dual::of(0.0); self.n_signals()];
-        for first in (0..nx).step_by(DUAL_WIDTH) {
-            let last = (first + DUAL_WIDTH).min(nx);
-            let seeded: Vec<Dual> = (0..nx)
-                .map(|i| {
-                    if (first..last).contains(&i) {
-                        variable(x[i], i - first)
-                    } else {
-                        Dual::of(x[i])
-                    }
-                })
-                .collect();
-            self.signals_at(&p, &seeded, &u, &mut y);
-            for (row, m) in self.measured.iter().enumerate() {
-                value[row] = y[m.index].value();
-                for column in first..last {
-                    jacobian[(row, column)] = derivative(&y[m.index], column - first);
-                }
-            }
-        }
-        (jacobian, value)
-    }
-
-    /// The state of least norm that explains the measurement `y` (NaN entries are left out):
-    /// one Gauss–Newton step from the origin, exact where the outputs are linear in the state.
-    pub fn state_from(&self, values: &[f64], y: &[f64]) -> Vec<f64> {
-        let nx = self.n_states();
-        let (mut jacobian, at_zero) = self.measurement_jacobian(values, &vec![0.0; nx]);
-        let mut difference = DVector::zeros(y.len());
-        for (i, value) in y.iter().enumerate() {
-            if value.is_finite() {
-                difference[i] = value - at_zero[i];
-            } else {
-                jacobian.row_mut(i).fill(0.0);
-            }
-        }
-        pseudo_inverse(&jacobian).map_or_else(
-            || vec![0.0; nx],
-            |inverse| (inverse * difference).iter().copied().collect(),
-        )
     }
 }
 

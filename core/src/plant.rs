@@ -102,7 +102,7 @@ pub trait Dynamics<S: Real>: Send + Sync {
     fn lower(&self, set: usize, from: &[S], p: &mut [S]);
 }
 
-/// Checks the sizes of a plant against its declaration; called by [`declare_plant!`] in a constant.
+/// Checks the sizes of a plant against its declaration; called by [`declare_plant!`](crate::declare_plant) in a constant.
 pub const fn check_sizes(
     meta: &PlantMeta,
     nx: usize,

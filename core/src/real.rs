@@ -141,7 +141,8 @@ mod tests {
     #[test]
     fn elementary_functions_have_their_derivatives() {
         let h = 1e-6;
-        let functions: [(fn(f64) -> f64, fn(Dual) -> Dual); 5] = [
+        type Pair = (fn(f64) -> f64, fn(Dual) -> Dual);
+        let functions: [Pair; 5] = [
             (Real::sin, Real::sin),
             (Real::cos, Real::cos),
             (Real::tanh, Real::tanh),

@@ -16,7 +16,7 @@ pub struct Tick<S> {
 
 /// Learns from the loop's samples; the loop hands it what was applied and what was measured.
 ///
-/// Implemented by [`crate::model::Identification`] on a host; `()` learns nothing.
+/// Implemented by `identification::Identification` on a host; `()` learns nothing.
 pub trait Observer<S: Real> {
     /// Inputs `applied` during the period that ends at `tick`, and what was measured at its end.
     fn observe(&mut self, tick: &Tick<S>, sample: &Sample<S>, measured: &[S], applied: &[S]);

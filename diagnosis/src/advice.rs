@@ -3,7 +3,7 @@
 use loopsight_core::model::Model;
 use serde::Serialize;
 
-use crate::diagnose::{Conclusion, Explanation};
+use crate::conclusion::{Conclusion, Explanation};
 
 /// An experiment and what it is good for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

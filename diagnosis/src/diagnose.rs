@@ -7,119 +7,38 @@ use loopsight_core::model::Model;
 use loopsight_core::run::Run;
 use loopsight_recordings::{Fault, Severity};
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::advice::{self, Advice};
 use crate::candidates::{Candidate, candidates};
-use crate::fit::{Estimate, Fit, FitError, FitSettings, Verdict};
+use crate::choose::choose;
+use crate::conclusion::{Conclusion, Diagnosis, Explanation, Level, Place};
+use crate::fit::{Fit, FitError, FitSettings, Verdict};
 use crate::floor::floor;
 use crate::holdout::Holdout;
 use crate::judge::{Losses, advantage, nrmse, significance};
 use crate::prediction::signal_rms;
 use crate::problem::{Effort, Problem, Solution};
 use crate::sufficiency;
-use crate::where_it_fails::{Statement, where_it_fails};
-
-/// An error, as the contract has it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Level {
-    /// Free-run error relative to the standard deviation.
-    pub nrmse: f64,
-}
-
-/// What a diagnosis concludes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Conclusion {
-    /// An effect of the library explains what the model does not.
-    EffectMissing,
-    /// The model explains the measurements as far as their noise lets tell.
-    NothingMissing,
-    /// Something is missing, and nothing in the library is it.
-    UnknownEffect,
-    /// The recording cannot carry the model.
-    DataInsufficient,
-    /// The recording is at fault.
-    LogFaulty,
-}
-
-/// An effect at its channels.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Place {
-    /// Id of the effect.
-    pub effect: String,
-    /// Ids of the channels.
-    pub at: Vec<String>,
-}
-
-/// One way to explain what the model does not.
-#[derive(Clone, Debug, Serialize)]
-pub struct Explanation {
-    /// The effect and where.
-    #[serde(flatten)]
-    pub place: Place,
-    /// Free-run error with it, on data it was not fitted to.
-    pub nrmse: f64,
-    /// The effect's parameters, by their ids.
-    pub parameters: BTreeMap<String, Estimate>,
-    /// How many standard errors it is from doing nothing: root of the likelihood ratio on all
-    /// samples that are independent of each other.
-    pub significance: f64,
-    /// Candidates that these data cannot tell from it.
-    pub indistinguishable_from: Vec<Place>,
-    /// What to know about it.
-    pub note: String,
-    /// The model with it, fitted.
-    #[serde(skip)]
-    pub model: Model,
-    /// Free-run error on what it was fitted to.
-    #[serde(skip)]
-    pub nrmse_fit: f64,
-}
-
-/// The result of [`diagnose`].
-#[derive(Clone, Debug, Serialize)]
-pub struct Diagnosis {
-    /// The model as it is, all its parameters refitted.
-    pub nominal: Level,
-    /// What noise and resolution alone would leave.
-    pub floor: Level,
-    /// The conclusion.
-    pub verdict: Conclusion,
-    /// The missing effect.
-    pub missing: Option<Place>,
-    /// Explanations, best first.
-    pub candidates: Vec<Explanation>,
-    /// Where the model fails, in words.
-    pub where_it_fails: Vec<Statement>,
-    /// Faults of the log.
-    pub faults: Vec<Fault>,
-    /// Experiments that would tell more.
-    pub advice: Vec<Advice>,
-    /// The nominal model, fitted.
-    #[serde(skip)]
-    pub model: Option<Model>,
-    /// Its error on what it was fitted to.
-    #[serde(skip)]
-    pub nominal_fit: f64,
-}
+use crate::where_it_fails::where_it_fails;
 
 /// Explanations that are reported.
 const REPORTED: usize = 12;
 /// Candidates that are fitted to the end.
-const FINALISTS: usize = 10;
+const FINALISTS: usize = 9;
 /// Starts of candidates that promise most and are looked at.
-const LOOKED_AT: usize = 40;
+const LOOKED_AT: usize = 36;
+/// Starts of one candidate that are looked at.
+const STARTS: usize = 2;
 /// Places of one effect among the finalists.
 const SIBLINGS: usize = 2;
 /// Effort of a first look at a candidate.
 const LOOK: Effort = Effort {
-    iterations: 10,
+    iterations: 7,
     tolerance: 1e-3,
 };
 /// Effort of a finalist.
 const FINAL: Effort = Effort {
-    iterations: 25,
+    iterations: 16,
     tolerance: 1e-6,
 };
 /// An explanation must beat the plain model by so many standard errors on data neither saw. There
@@ -133,15 +52,13 @@ const CERTAIN: f64 = 5.0;
 /// What it explains must be so large beside the floor, as a share of it, to matter.
 const MATTERS: f64 = 0.2;
 /// Explanations whose losses differ by fewer standard errors than this are not told apart.
-const SAME: f64 = 2.0;
+pub(crate) const SAME: f64 = 2.0;
 /// Errors within this ratio are the same for all that can be done with them.
-const CLOSE: f64 = 1.01;
+pub(crate) const CLOSE: f64 = 1.01;
 /// An explanation that leaves less than this multiple of the floor explains everything.
 const COMPLETE: f64 = 1.2;
 /// Least share of the standard deviation that an explanation must account for.
 pub(crate) const LEAST: f64 = 0.004;
-/// Share of what the best explanation leaves above the floor by which a smaller one may be worse.
-const BLUR: f64 = 0.3;
 /// Below this multiple of the floor a log explains itself.
 const BLIND: f64 = 1.3;
 /// Above this multiple of the floor something must be missing.
@@ -150,14 +67,15 @@ const ABOVE_FLOOR: f64 = 1.5;
 /// Longest integration step of a first look, s: far below what any sensor sees.
 const LOOK_STEP: f64 = 0.005;
 
+/// A candidate, fitted and judged.
 #[derive(Clone)]
-struct Judged {
-    candidate: Candidate,
-    solution: Solution,
+pub(crate) struct Judged {
+    pub(crate) candidate: Candidate,
+    pub(crate) solution: Solution,
     /// On what no fit saw.
-    losses: Losses,
+    pub(crate) losses: Losses,
     /// What candidates are ranked by.
-    rank: Losses,
+    pub(crate) rank: Losses,
 }
 
 /// Adds every effect of the library to `model` at every place it fits, refits all parameters each
@@ -227,6 +145,13 @@ pub(crate) fn diagnose_above(
         })
         .collect();
     promising.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    // No effect with many starts may crowd the others out.
+    let mut starts_taken = vec![0; all.len()];
+    promising.retain(|(_, k)| {
+        let taken = &mut starts_taken[attempts[*k].0];
+        *taken += 1;
+        *taken <= STARTS
+    });
     promising.truncate(LOOKED_AT);
     let mut looked: Vec<(usize, Judged)> = promising
         .par_iter()
@@ -493,52 +418,4 @@ fn note(fit: &Fit, candidate: &Candidate) -> String {
         }
     }
     words.join("; ")
-}
-
-struct Chosen {
-    finalist: usize,
-}
-
-/// Puts the smallest explanation that is not significantly worse than the best one first, with
-/// those that cannot be told from it.
-fn choose(
-    explanations: &mut Vec<Explanation>,
-    finalists: &[(Judged, Fit)],
-    floor: f64,
-) -> Option<Chosen> {
-    let best = &finalists.first()?.0;
-    let squared = |i: usize| nrmse(&finalists[i].0.rank).powi(2);
-    let least = squared(0);
-    // While the best explanation itself leaves much unexplained, small differences between
-    // explanations are those of what else is missing.
-    let allowed = least + BLUR * (least - floor * floor).max(0.0);
-    let not_worse: Vec<usize> = (0..finalists.len())
-        .filter(|i| {
-            let rank = &finalists[*i].0.rank;
-            advantage(rank, &best.rank) < SAME
-                || nrmse(rank) < CLOSE * nrmse(&best.rank)
-                || squared(*i) < allowed
-        })
-        .collect();
-    let complexity = |i: usize| finalists[i].0.candidate.complexity();
-    let chosen = *not_worse.iter().min_by(|a, b| {
-        // The common before the rare, and both wheels alike before one wheel: what is built alike
-        // fails alike.
-        let channels = |i: usize| usize::MAX - explanations[i].place.at.len();
-        let rarity = |i: usize| finalists[i].0.candidate.meta.rarity;
-        let key = |i: usize| (complexity(i), rarity(i), channels(i));
-        let error = |i: usize| nrmse(&finalists[i].0.rank);
-        key(**a)
-            .cmp(&key(**b))
-            .then(error(**a).total_cmp(&error(**b)))
-    })?;
-    let class: Vec<Place> = not_worse
-        .iter()
-        .filter(|i| **i != chosen && complexity(**i) <= complexity(chosen))
-        .map(|i| explanations[*i].place.clone())
-        .collect();
-    explanations[chosen].indistinguishable_from = class;
-    let first = explanations.remove(chosen);
-    explanations.insert(0, first);
-    Some(Chosen { finalist: chosen })
 }

@@ -5,7 +5,8 @@ use loopsight_core::run::Run;
 use loopsight_recordings::Fault;
 use serde::Serialize;
 
-use crate::diagnose::{Conclusion, Diagnosis, LEAST, Place, diagnose_above};
+use crate::conclusion::{Conclusion, Diagnosis, Place};
+use crate::diagnose::{LEAST, diagnose_above};
 use crate::fit::{Fit, FitError, FitSettings, fit};
 
 /// One step of an improvement.
@@ -36,11 +37,11 @@ pub struct Improvement {
 
 /// Share of the first error that a further effect must account for: beyond it a library finds
 /// something for every wiggle.
-const WORTH: f64 = 0.06;
+const WORTH: f64 = 0.04;
 /// Most effects that are added: beyond that a library is fitting, not explaining.
 const MOST: usize = 6;
 
-/// Repeats [`diagnose`], adding what it finds missing, until it finds nothing more.
+/// Repeats [`diagnose`](crate::diagnose()), adding what it finds missing, until it finds nothing more.
 ///
 /// `progress` gets the round, and the candidates done and in all.
 pub fn improve(
@@ -61,16 +62,16 @@ pub fn improve(
             progress(round, done, total);
         })?;
         let verdict = diagnosis.verdict;
-        if let Some(fitted) = &diagnosis.model {
-            if steps.is_empty() {
-                first = Some(diagnosis.nominal.nrmse);
-                steps.push(Step {
-                    added: None,
-                    nrmse_fit: diagnosis.nominal_fit,
-                    nrmse_test: diagnosis.nominal.nrmse,
-                });
-                present = fitted.clone();
-            }
+        if let Some(fitted) = &diagnosis.model
+            && steps.is_empty()
+        {
+            first = Some(diagnosis.nominal.nrmse);
+            steps.push(Step {
+                added: None,
+                nrmse_fit: diagnosis.nominal_fit,
+                nrmse_test: diagnosis.nominal.nrmse,
+            });
+            present = fitted.clone();
         }
         let next = match (&diagnosis.missing, diagnosis.candidates.first()) {
             (Some(_), Some(best)) if round < MOST => Some(best.clone()),

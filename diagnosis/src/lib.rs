@@ -3,7 +3,9 @@
 
 mod advice;
 mod candidates;
+mod choose;
 mod compare;
+mod conclusion;
 mod diagnose;
 mod experiment;
 pub mod fit;
@@ -18,6 +20,7 @@ mod prediction;
 mod problem;
 mod regression;
 mod rls;
+mod rounding;
 mod score;
 mod sufficiency;
 pub mod tracking;
@@ -25,7 +28,8 @@ mod where_it_fails;
 
 pub use advice::Advice;
 pub use compare::{CompareError, Comparison, RunTrace, SignalTrace, compare};
-pub use diagnose::{Conclusion, Diagnosis, Explanation, Level, Place, diagnose};
+pub use conclusion::{Conclusion, Diagnosis, Explanation, Level, Place};
+pub use diagnose::diagnose;
 pub use experiment::{
     Considered, Drive, Limits, Plan, Promise, Question, QuestionError, experiment, place,
 };

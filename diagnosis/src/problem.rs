@@ -13,15 +13,11 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fit::{FitError, FitSettings};
 use crate::flatness::{DEAD, Named};
-use crate::noise::{self, Block};
+use crate::noise::Block;
 use crate::prediction::{InitialStates, predict, residuals, sensitivities, visible_states};
 use crate::regression::batch;
 use crate::score::Tally;
 
-/// A residual whose noise model has `c` below this and `a` within ±[`SLOW`] is rounded counts.
-const ROUNDED: f64 = -0.8;
-/// See [`ROUNDED`].
-const SLOW: f64 = 0.3;
 /// Spans of the regressions that a fit may start from, s.
 const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
 
@@ -30,22 +26,22 @@ type Linearised = (DVector<f64>, DVector<f64>, DMatrix<f64>);
 
 pub(crate) struct Problem<'a> {
     pub(crate) model: &'a Model,
-    runs: &'a [Run],
+    pub(crate) runs: &'a [Run],
     progress: &'a (dyn Fn(u64, f64) + Sync),
     /// Indices of the estimated parameters.
     pub(crate) free: Vec<usize>,
     /// Plant states whose initial values are estimated.
-    visible: Vec<usize>,
+    pub(crate) visible: Vec<usize>,
     /// One over the standard deviation of each signal, over the root of the number of samples.
-    weights: Vec<f64>,
+    pub(crate) weights: Vec<f64>,
     /// Unknown = scaled unknown × scale.
     pub(crate) scales: Vec<f64>,
-    lower: DVector<f64>,
-    upper: DVector<f64>,
+    pub(crate) lower: DVector<f64>,
+    pub(crate) upper: DVector<f64>,
     /// Moving-average coefficient by signal; empty in the first pass.
-    rounding: Vec<f64>,
+    pub(crate) rounding: Vec<f64>,
     pub(crate) evaluations: Cell<u64>,
-    cache: RefCell<Option<Linearised>>,
+    pub(crate) cache: RefCell<Option<Linearised>>,
     pub(crate) samples: f64,
     /// Samples that the fit may see, by run; all where there is none.
     seen: Option<&'a [Vec<bool>]>,
@@ -253,43 +249,6 @@ impl<'a> Problem<'a> {
         Solution { values, states }
     }
 
-    /// Turns to the second pass if the residuals at `solution` are rounded counts; returns where it
-    /// starts.
-    pub(crate) fn whiten(&mut self, solution: &DVector<f64>) -> Option<DVector<f64>> {
-        let (residual, jacobian) = self.linearise(solution);
-        let blocks = self.blocks(&residual, &jacobian);
-        let n_signals = self.weights.len();
-        let rounding: Vec<f64> = (0..n_signals)
-            .map(|signal| {
-                let series: Vec<&[f64]> = blocks
-                    .iter()
-                    .map(|b| b[signal].residual.as_slice())
-                    .collect();
-                let model = noise::Arma::fit(&series);
-                let rounded = model.c < ROUNDED && model.a.abs() < SLOW;
-                if rounded { model.c } else { 0.0 }
-            })
-            .collect();
-        if rounding.iter().all(|c| *c == 0.0) {
-            return None;
-        }
-        self.rounding = rounding;
-        self.cache.replace(None);
-        let more = self.runs.len() * n_signals;
-        // In units of the first residuals, so that all unknowns are of order one.
-        let scale = residual.norm() / (residual.len() as f64).sqrt();
-        self.scales.extend(std::iter::repeat_n(scale, more));
-        self.lower = self
-            .lower
-            .clone()
-            .resize_vertically(self.scales.len(), f64::NEG_INFINITY);
-        self.upper = self
-            .upper
-            .clone()
-            .resize_vertically(self.scales.len(), f64::INFINITY);
-        Some(solution.clone().resize_vertically(self.scales.len(), 0.0))
-    }
-
     /// Scales the unknowns so that each moves the residuals alike, as the damping of the solver
     /// expects (J. J. Moré, 1978, "The Levenberg-Marquardt algorithm", section 6).
     pub(crate) fn balance(&mut self, mut scaled: DVector<f64>) -> DVector<f64> {
@@ -305,56 +264,6 @@ impl<'a> Problem<'a> {
         }
         self.cache.replace(None);
         scaled
-    }
-
-    /// First of the unknowns `ε` before the runs.
-    fn first_before(&self) -> usize {
-        self.free.len() + self.runs.len() * self.visible.len()
-    }
-
-    /// In the second pass, turns the weighted residuals of one run into `ε`.
-    fn filter(&self, run: usize, residual: &mut [f64], scaled: &DVector<f64>) {
-        let n_signals = self.weights.len();
-        for (signal, c) in self.rounding.iter().enumerate() {
-            if *c == 0.0 {
-                continue;
-            }
-            let unknown = self.first_before() + run * n_signals + signal;
-            let mut before = scaled[unknown] * self.scales[unknown];
-            for value in residual.iter_mut().skip(signal).step_by(n_signals) {
-                *value -= c * before;
-                before = *value;
-            }
-        }
-    }
-
-    /// As [`Problem::filter`] for the rows of the Jacobian that belong to one run.
-    fn filter_jacobian(
-        &self,
-        run: usize,
-        first_row: usize,
-        rows: usize,
-        jacobian: &mut DMatrix<f64>,
-    ) {
-        let n_signals = self.weights.len();
-        for (signal, c) in self.rounding.iter().enumerate() {
-            if *c == 0.0 {
-                continue;
-            }
-            let unknown = self.first_before() + run * n_signals + signal;
-            for column in 0..jacobian.ncols() {
-                let mut before = if column == unknown {
-                    self.scales[unknown]
-                } else {
-                    0.0
-                };
-                for row in (first_row + signal..first_row + rows).step_by(n_signals) {
-                    let value = &mut jacobian[(row, column)];
-                    *value -= c * before;
-                    before = *value;
-                }
-            }
-        }
     }
 
     /// Parameter values and initial states behind scaled unknowns.

@@ -5,6 +5,20 @@ use loopsight_core::run::Run;
 
 use crate::advice::Advice;
 
+/// Least time with something moving, s.
+const LEAST_MOTION: f64 = 2.0;
+
+/// Whether a measured signal changes in a run.
+fn moves(run: &Run) -> bool {
+    (0..run.n_measured).any(|i| {
+        let mut values = (0..run.len())
+            .map(|k| run.sample(k)[i])
+            .filter(|v| v.is_finite());
+        let first = values.next();
+        values.any(|v| Some(v) != first)
+    })
+}
+
 /// Reasons why not; empty when it can.
 pub(crate) fn reasons(model: &Model, runs: &[Run]) -> Vec<Advice> {
     let mut list = Vec::new();
@@ -15,7 +29,7 @@ pub(crate) fn reasons(model: &Model, runs: &[Run]) -> Vec<Advice> {
         });
     };
     let duration: f64 = runs.iter().map(Run::duration).sum();
-    if duration < 2.0 {
+    if duration < LEAST_MOTION {
         say(
             format!("the runs last {duration:.2} s in all"),
             "record at least ten times the slowest time constant, 20 s as a rule",
@@ -43,14 +57,16 @@ pub(crate) fn reasons(model: &Model, runs: &[Run]) -> Vec<Advice> {
             );
         }
     }
-    let moves = (0..model.measured.len()).any(|i| {
-        let mut values = runs
-            .iter()
-            .flat_map(|r| (0..r.len()).map(move |k| r.sample(k)[i]));
-        let first = values.find(|v| v.is_finite());
-        values.any(|v| v.is_finite() && Some(v) != first)
-    });
-    if !moves {
+    let moving: f64 = runs.iter().filter(|r| moves(r)).map(Run::duration).sum();
+    if moving > 0.0 && moving < LEAST_MOTION && duration >= LEAST_MOTION {
+        say(
+            format!(
+                "something moves in {moving:.2} s of {duration:.2} s only; in the other runs no measured signal changes"
+            ),
+            "record runs in which the machine moves, with inputs above its friction, 20 s as a rule",
+        );
+    }
+    if !runs.iter().any(moves) {
         say(
             "no measured signal ever changes".to_owned(),
             "check that the motors are enabled and the sensors connected, and record again",

@@ -420,10 +420,10 @@ mod tests {
         let response = PiResponse::new(kp, ki).unwrap();
         let (up, down) = (vec![0.2; 100], vec![-1.3; 100]);
         let ideal = settings.ideal(&[up, down], 0.01).unwrap();
-        for k in 0..100 {
+        for (k, (forward, turning)) in ideal[0].iter().zip(&ideal[1]).enumerate() {
             let share = 1.0 - response.error(0.01 * k as f64);
-            assert!((ideal[0][k] - 0.2 * share).abs() < 1e-12);
-            assert!((ideal[1][k] + 1.3 * share).abs() < 1e-12);
+            assert!((forward - 0.2 * share).abs() < 1e-12);
+            assert!((turning + 1.3 * share).abs() < 1e-12);
         }
         let settings = FeedbackLinearizingPiSettings {
             open_loop_acceleration: Some(vec![0.6, 0.0]),

@@ -1,0 +1,95 @@
+//! What a diagnosis says.
+
+use std::collections::BTreeMap;
+
+use loopsight_core::model::Model;
+use loopsight_recordings::Fault;
+use serde::Serialize;
+
+use crate::advice::Advice;
+use crate::fit::Estimate;
+use crate::where_it_fails::Statement;
+
+/// An error, as the contract has it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Level {
+    /// Free-run error relative to the standard deviation.
+    pub nrmse: f64,
+}
+
+/// What a diagnosis concludes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Conclusion {
+    /// An effect of the library explains what the model does not.
+    EffectMissing,
+    /// The model explains the measurements as far as their noise lets tell.
+    NothingMissing,
+    /// Something is missing, and nothing in the library is it.
+    UnknownEffect,
+    /// The recording cannot carry the model.
+    DataInsufficient,
+    /// The recording is at fault.
+    LogFaulty,
+}
+
+/// An effect at its channels.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Place {
+    /// Id of the effect.
+    pub effect: String,
+    /// Ids of the channels.
+    pub at: Vec<String>,
+}
+
+/// One way to explain what the model does not.
+#[derive(Clone, Debug, Serialize)]
+pub struct Explanation {
+    /// The effect and where.
+    #[serde(flatten)]
+    pub place: Place,
+    /// Free-run error with it, on data it was not fitted to.
+    pub nrmse: f64,
+    /// The effect's parameters, by their ids.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// How many standard errors it is from doing nothing: root of the likelihood ratio on all
+    /// samples that are independent of each other.
+    pub significance: f64,
+    /// Candidates that these data cannot tell from it.
+    pub indistinguishable_from: Vec<Place>,
+    /// What to know about it.
+    pub note: String,
+    /// The model with it, fitted.
+    #[serde(skip)]
+    pub model: Model,
+    /// Free-run error on what it was fitted to.
+    #[serde(skip)]
+    pub nrmse_fit: f64,
+}
+
+/// The result of [`diagnose`](crate::diagnose()).
+#[derive(Clone, Debug, Serialize)]
+pub struct Diagnosis {
+    /// The model as it is, all its parameters refitted.
+    pub nominal: Level,
+    /// What noise and resolution alone would leave.
+    pub floor: Level,
+    /// The conclusion.
+    pub verdict: Conclusion,
+    /// The missing effect.
+    pub missing: Option<Place>,
+    /// Explanations, best first.
+    pub candidates: Vec<Explanation>,
+    /// Where the model fails, in words.
+    pub where_it_fails: Vec<Statement>,
+    /// Faults of the log.
+    pub faults: Vec<Fault>,
+    /// Experiments that would tell more.
+    pub advice: Vec<Advice>,
+    /// The nominal model, fitted.
+    #[serde(skip)]
+    pub model: Option<Model>,
+    /// Its error on what it was fitted to.
+    #[serde(skip)]
+    pub nominal_fit: f64,
+}

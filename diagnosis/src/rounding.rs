@@ -1,0 +1,100 @@
+//! The second pass of a fit, where residuals are those of rounded counts.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::noise;
+use crate::problem::Problem;
+
+/// A residual whose noise model has `c` below this and `a` within ±[`SLOW`] is rounded counts.
+const ROUNDED: f64 = -0.8;
+/// See [`ROUNDED`].
+const SLOW: f64 = 0.3;
+
+impl Problem<'_> {
+    /// Turns to the second pass if the residuals at `solution` are rounded counts; returns where it
+    /// starts.
+    pub(crate) fn whiten(&mut self, solution: &DVector<f64>) -> Option<DVector<f64>> {
+        let (residual, jacobian) = self.linearise(solution);
+        let blocks = self.blocks(&residual, &jacobian);
+        let n_signals = self.weights.len();
+        let rounding: Vec<f64> = (0..n_signals)
+            .map(|signal| {
+                let series: Vec<&[f64]> = blocks
+                    .iter()
+                    .map(|b| b[signal].residual.as_slice())
+                    .collect();
+                let model = noise::Arma::fit(&series);
+                let rounded = model.c < ROUNDED && model.a.abs() < SLOW;
+                if rounded { model.c } else { 0.0 }
+            })
+            .collect();
+        if rounding.iter().all(|c| *c == 0.0) {
+            return None;
+        }
+        self.rounding = rounding;
+        self.cache.replace(None);
+        let more = self.runs.len() * n_signals;
+        // In units of the first residuals, so that all unknowns are of order one.
+        let scale = residual.norm() / (residual.len() as f64).sqrt();
+        self.scales.extend(std::iter::repeat_n(scale, more));
+        self.lower = self
+            .lower
+            .clone()
+            .resize_vertically(self.scales.len(), f64::NEG_INFINITY);
+        self.upper = self
+            .upper
+            .clone()
+            .resize_vertically(self.scales.len(), f64::INFINITY);
+        Some(solution.clone().resize_vertically(self.scales.len(), 0.0))
+    }
+
+    /// First of the unknowns `ε` before the runs.
+    fn first_before(&self) -> usize {
+        self.free.len() + self.runs.len() * self.visible.len()
+    }
+
+    /// In the second pass, turns the weighted residuals of one run into `ε`.
+    pub(crate) fn filter(&self, run: usize, residual: &mut [f64], scaled: &DVector<f64>) {
+        let n_signals = self.weights.len();
+        for (signal, c) in self.rounding.iter().enumerate() {
+            if *c == 0.0 {
+                continue;
+            }
+            let unknown = self.first_before() + run * n_signals + signal;
+            let mut before = scaled[unknown] * self.scales[unknown];
+            for value in residual.iter_mut().skip(signal).step_by(n_signals) {
+                *value -= c * before;
+                before = *value;
+            }
+        }
+    }
+
+    /// As [`Problem::filter`] for the rows of the Jacobian that belong to one run.
+    pub(crate) fn filter_jacobian(
+        &self,
+        run: usize,
+        first_row: usize,
+        rows: usize,
+        jacobian: &mut DMatrix<f64>,
+    ) {
+        let n_signals = self.weights.len();
+        for (signal, c) in self.rounding.iter().enumerate() {
+            if *c == 0.0 {
+                continue;
+            }
+            let unknown = self.first_before() + run * n_signals + signal;
+            for column in 0..jacobian.ncols() {
+                let mut before = if column == unknown {
+                    self.scales[unknown]
+                } else {
+                    0.0
+                };
+                for row in (first_row + signal..first_row + rows).step_by(n_signals) {
+                    let value = &mut jacobian[(row, column)];
+                    *value -= c * before;
+                    before = *value;
+                }
+            }
+        }
+    }
+}
