@@ -7,12 +7,12 @@
   const themes = {
     light: {
       ink: "#1d2126", soft: "#59616b", paper: "#ffffff", grid: "#e6e9ed", zero: "#aab2bc", shade: "rgba(213,94,0,.16)",
-      measured: "#555b63", commanded: "#555b63", model: "#d55e00", one_step: "#c0588f", reference: "#008f6b", residual: "#7d3f98",
+      measured: "#555b63", commanded: "#555b63", model: "#d55e00", after: "#0072b2", mean_after: "#0072b2", one_step: "#c0588f", reference: "#008f6b", residual: "#7d3f98",
       points: "rgba(85,91,99,.28)", mean: "#d55e00", series: ["#0072b2", "#c98300", "#008f6b", "#c0588f"],
     },
     dark: {
       ink: "#e4e7eb", soft: "#a3abb5", paper: "#1c2025", grid: "#2c3239", zero: "#5a636e", shade: "rgba(255,157,77,.22)",
-      measured: "#b9c0c9", commanded: "#b9c0c9", model: "#ff9d4d", one_step: "#e79ac4", reference: "#3dd6a3", residual: "#cf9ae8",
+      measured: "#b9c0c9", commanded: "#b9c0c9", model: "#ff9d4d", after: "#6bb7f0", mean_after: "#6bb7f0", one_step: "#e79ac4", reference: "#3dd6a3", residual: "#cf9ae8",
       points: "rgba(185,192,201,.28)", mean: "#ff9d4d", series: ["#6bb7f0", "#f0c04a", "#3dd6a3", "#e79ac4"],
     },
   };
@@ -30,7 +30,8 @@
         const color = trace.role === "series" ? theme.series[nth] : theme[trace.role];
         const x = trace.x ?? chart.times;
         const common = { x, yaxis, xaxis: "x", entry: trace.role + trace.name, visible: !trace.hidden };
-        if (trace.spread && trace.role !== "mean") {
+        const mean = trace.role === "mean" || trace.role === "mean_after";
+        if (trace.spread && !mean) {
           const edge = sign => trace.y.map((y, k) => y === null || trace.spread[k] === null ? null : y + sign * trace.spread[k]);
           const band = { ...common, mode: "lines", line: { width: 0 }, hoverinfo: "skip" };
           out.push({ ...band, y: edge(-1) }, { ...band, y: edge(1), fill: "tonexty", fillcolor: theme.shade });
@@ -39,13 +40,16 @@
         if (trace.role === "points") {
           Object.assign(drawn, { type: "scatter", mode: "markers", marker: { color, size: 3 }, hoverinfo: "skip" });
         } else {
-          const width = trace.role === "measured" ? 1.3 : 1.7;
-          drawn.mode = trace.role === "mean" ? "lines+markers" : "lines";
+          // Two models on top of what was measured: that must show from beneath.
+          const beneath = trace.role === "measured" && panel.traces.some(t => t.role === "after");
+          const width = beneath ? 5 : trace.role === "measured" ? 1.3 : 1.7;
+          if (beneath) drawn.opacity = 0.4;
+          drawn.mode = mean ? "lines+markers" : "lines";
           drawn.line = { color, width, dash: trace.role === "commanded" ? "dot" : dashes[nth], shape: trace.step ? "hv" : "linear" };
           drawn.marker = { color, size: 6 };
           drawn.hovertemplate = "%{y:.5~g}";
         }
-        if (trace.role === "mean") {
+        if (mean) {
           drawn.error_y = { type: "data", array: trace.spread, color, thickness: 1, width: 3 };
           drawn.hovertemplate = "%{y:.3~g} ± %{error_y.array:.2~g}<extra></extra>";
         }
@@ -65,7 +69,7 @@
       hoverlabel: { bgcolor: theme.paper, bordercolor: theme.zero, font: { color: theme.ink, family: font, size: 12 } },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: theme.soft, activecolor: theme.ink },
       xaxis: {
-        gridcolor: theme.grid, linecolor: theme.zero, zeroline: false, anchor: chart.panels.length > 1 ? `y${chart.panels.length}` : "y",
+        gridcolor: theme.grid, linecolor: theme.zero, zeroline: false, ...(chart.x_range && { range: chart.x_range }), anchor: chart.panels.length > 1 ? `y${chart.panels.length}` : "y",
         ...(!chart.small && { title: { text: escape(chart.x_title), standoff: 4 } }), hoverformat: ".5~g", ticks: "outside", ticklen: 3, tickcolor: theme.zero,
         showspikes: true, spikethickness: 1, spikedash: "dot", spikecolor: theme.zero, spikemode: "across",
       },
@@ -117,6 +121,18 @@
     const box = div.parentElement.querySelector(".legend");
     if (!box) return;
     box.replaceChildren();
+    if (div.chart.x_range) {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.className = "all";
+      button.append("show the whole run");
+      button.onclick = () => {
+        const all = button.textContent === "show the whole run";
+        button.textContent = all ? "show the worst stretch" : "show the whole run";
+        Plotly.relayout(div, all ? { "xaxis.autorange": true } : { "xaxis.range": [...div.chart.x_range] });
+      };
+      box.append(button);
+    }
     for (const { traces, trace } of entries.values()) {
       const button = document.createElement("button");
       button.type = "button";
@@ -140,7 +156,7 @@
     const theme = dark.matches ? themes.dark : themes.light;
     const drawn = traces(div.chart, theme);
     const config = {
-      responsive: true, displaylogo: false, displayModeBar: div.chart.small ? false : coarse.matches ? true : "hover",
+      responsive: true, doubleClick: "autosize", displaylogo: false, displayModeBar: div.chart.small ? false : coarse.matches ? true : "hover",
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
     };
     Plotly.react(div, drawn, layout(div.chart, theme), config);

@@ -15,12 +15,16 @@ const DIGITS: usize = 5;
 pub(crate) enum Role {
     Measured,
     Model,
+    /// A model after it was changed.
+    After,
     OneStep,
     Reference,
     Commanded,
     Residual,
     Points,
     Mean,
+    /// As [`Role::Mean`], of a model after it was changed.
+    MeanAfter,
     /// One of several alike: inputs, parameters.
     Series,
 }
@@ -74,6 +78,9 @@ pub(crate) struct Chart {
     pub(crate) x_title: String,
     times: Vec<f64>,
     pub(crate) panels: Vec<Panel>,
+    /// What the horizontal axis spans at first; absent: everything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) x_range: Option<[f64; 2]>,
     /// Numbered vertical lines.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) events: Vec<f64>,

@@ -23,7 +23,7 @@ pub(crate) fn body(comparison: &Comparison) -> String {
         "<p class=\"verdict\">{}</p>\n",
         escape(&verdict(comparison))
     );
-    let mut body = verdict + &faults(&comparison.faults) + &scores(&comparison.signals);
+    let mut body = verdict + &faults(&comparison.faults, "compared") + &scores(&comparison.signals);
     body.push_str(&section(
         "Over time",
         "Drag across a chart to zoom in, double-click to see all again; a tap on a legend entry \
@@ -40,7 +40,8 @@ pub(crate) fn body(comparison: &Comparison) -> String {
     body
 }
 
-fn faults(faults: &[Fault]) -> String {
+/// The faults of a log in a box, found before anything was `done`.
+pub(crate) fn faults(faults: &[Fault], done: &str) -> String {
     if faults.is_empty() {
         return String::new();
     }
@@ -68,7 +69,7 @@ fn faults(faults: &[Fault]) -> String {
         })
         .collect();
     format!(
-        "<div class=\"box\"><h2>Faults of the log</h2><p>Found before anything was compared; what \
+        "<div class=\"box\"><h2>Faults of the log</h2><p>Found before anything was {done}; what \
          they touch is doubtful.</p><ul>{items}</ul></div>\n"
     )
 }
@@ -213,7 +214,8 @@ fn failures(comparison: &Comparison) -> String {
             &errors(&comparison.runs, &score.id),
             &comparison.runs,
         );
-        let charts: String = scatter::charts(&comparison.runs, &score.id, &score.unit).concat();
+        let charts: String =
+            scatter::charts(&comparison.runs, None, &score.id, &score.unit).concat();
         out.push_str(&format!(
             "<details class=\"signal\"{open}><summary><h3>{}</h3></summary>{}<div class=\"grid\">\
              {charts}</div></details>\n",

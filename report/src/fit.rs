@@ -191,7 +191,8 @@ fn continued(points: &[(f64, f64)]) -> Vec<f64> {
         .collect()
 }
 
-fn estimates(parameters: &[(&String, &Estimate)]) -> String {
+/// Estimated parameters in a table.
+pub(crate) fn estimates(parameters: &[(&String, &Estimate)]) -> String {
     let rows: Vec<Vec<String>> = parameters
         .iter()
         .map(|(name, e)| {

@@ -63,8 +63,13 @@ pub(crate) fn bins(points: &[(f64, f64)]) -> Vec<Bin> {
 }
 
 /// A small chart for each quantity that the residual of signal `id` may depend on: the measured
-/// signals, then the inputs.
-pub(crate) fn charts(runs: &[RunTrace], id: &str, unit: &str) -> Vec<String> {
+/// signals, then the inputs. Of the runs of another model, with its name, only the averages.
+pub(crate) fn charts(
+    runs: &[RunTrace],
+    after: Option<(&str, &[RunTrace])>,
+    id: &str,
+    unit: &str,
+) -> Vec<String> {
     let Some(first) = runs.first() else {
         return Vec::new();
     };
@@ -79,20 +84,8 @@ pub(crate) fn charts(runs: &[RunTrace], id: &str, unit: &str) -> Vec<String> {
     signals
         .chain(inputs)
         .map(|(name, of_unit, measured)| {
-            let points: Vec<(f64, f64)> = runs
-                .iter()
-                .filter_map(|run| {
-                    let residual = residual(signal(run, id)?);
-                    let values = if measured {
-                        &signal(run, name)?.measured
-                    } else {
-                        &run.inputs.iter().find(|input| input.0 == name)?.2
-                    };
-                    Some(values.iter().copied().zip(residual).collect::<Vec<_>>())
-                })
-                .flatten()
-                .filter(|(x, y)| x.is_finite() && y.is_finite())
-                .collect();
+            let points = cloud(runs, id, name, measured);
+            let after = after.map(|(of, runs)| (of, cloud(runs, id, name, measured)));
             let against = if measured {
                 format!("measured {name}")
             } else {
@@ -100,6 +93,7 @@ pub(crate) fn charts(runs: &[RunTrace], id: &str, unit: &str) -> Vec<String> {
             };
             chart(
                 &points,
+                after.as_ref().map(|(of, points)| (*of, points.as_slice())),
                 axis(&against, of_unit),
                 axis(&format!("residual of {id}"), unit),
             )
@@ -107,7 +101,44 @@ pub(crate) fn charts(runs: &[RunTrace], id: &str, unit: &str) -> Vec<String> {
         .collect()
 }
 
-fn chart(points: &[(f64, f64)], x_title: String, y_title: String) -> String {
+/// The residuals of signal `id` over the quantity `name`.
+fn cloud(runs: &[RunTrace], id: &str, name: &str, measured: bool) -> Vec<(f64, f64)> {
+    runs.iter()
+        .filter_map(|run| {
+            let residual = residual(signal(run, id)?);
+            let values = if measured {
+                &signal(run, name)?.measured
+            } else {
+                &run.inputs.iter().find(|input| input.0 == name)?.2
+            };
+            Some(values.iter().copied().zip(residual).collect::<Vec<_>>())
+        })
+        .flatten()
+        .filter(|(x, y)| x.is_finite() && y.is_finite())
+        .collect()
+}
+
+fn chart(
+    points: &[(f64, f64)],
+    after: Option<(&str, &[(f64, f64)])>,
+    x_title: String,
+    y_title: String,
+) -> String {
+    let column = |values: &mut dyn Iterator<Item = f64>| {
+        values.map(|v| significant(v, 4)).collect::<Vec<f64>>()
+    };
+    let mean = |name: &str, role: Role, points: &[(f64, f64)]| {
+        let bins = bins(points);
+        Trace {
+            name: name.into(),
+            role,
+            x: Abscissae::Own(column(&mut bins.iter().map(|b| b.x))),
+            y: column(&mut bins.iter().map(|b| b.mean)),
+            spread: Some(column(&mut bins.iter().map(|b| b.std))),
+            step: false,
+            hidden: false,
+        }
+    };
     let mut chart = Chart::over(x_title);
     chart.small = true;
     chart.panel(y_title, 190);
@@ -115,10 +146,6 @@ fn chart(points: &[(f64, f64)], x_title: String, y_title: String) -> String {
         .into_iter()
         .map(|k| points[k])
         .collect();
-    let bins = bins(points);
-    let column = |values: &mut dyn Iterator<Item = f64>| {
-        values.map(|v| significant(v, 4)).collect::<Vec<f64>>()
-    };
     chart.push(Trace {
         name: "samples".into(),
         role: Role::Points,
@@ -128,15 +155,10 @@ fn chart(points: &[(f64, f64)], x_title: String, y_title: String) -> String {
         step: false,
         hidden: false,
     });
-    chart.push(Trace {
-        name: "mean ± standard deviation".into(),
-        role: Role::Mean,
-        x: Abscissae::Own(column(&mut bins.iter().map(|b| b.x))),
-        y: column(&mut bins.iter().map(|b| b.mean)),
-        spread: Some(column(&mut bins.iter().map(|b| b.std))),
-        step: false,
-        hidden: false,
-    });
+    chart.push(mean("mean ± standard deviation", Role::Mean, points));
+    if let Some((name, points)) = after {
+        chart.push(mean(name, Role::MeanAfter, points));
+    }
     chart.html()
 }
 
@@ -188,10 +210,10 @@ mod tests {
     #[test]
     fn clouds_are_thinned() {
         let runs = friction_runs(2, 20_000);
-        let charts = charts(&runs, "linear_velocity", "m/s");
+        let charts = charts(&runs, None, "linear_velocity", "m/s");
         assert_eq!(charts.len(), 4);
         assert!(charts[0].len() < 120_000, "{}", charts[0].len());
         assert!(charts[2].contains("voltage_right, V"));
-        assert!(super::charts(&[], "v", "m").is_empty());
+        assert!(super::charts(&[], None, "v", "m").is_empty());
     }
 }

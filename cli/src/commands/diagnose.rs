@@ -1,14 +1,17 @@
 //! `loopsight diagnose`.
 
+use loopsight_core::model::Model;
 use loopsight_core::run::Run;
-use loopsight_diagnosis::{Conclusion, Diagnosis, Explanation, diagnose};
+use loopsight_diagnosis::{Comparison, Conclusion, Diagnosis, Explanation, compare, diagnose};
+use loopsight_report::{Context, diagnosis_page, save};
 
 use crate::arguments::DiagnoseOptions;
 use crate::failure::Failure;
-use crate::load::{Loaded, model_and_log, recording};
+use crate::load::{Loaded, model_and_log, recording, writable};
 use crate::{output, progress};
 
 pub(crate) fn run(options: &DiagnoseOptions) -> Result<(), Failure> {
+    options.html.as_deref().map_or(Ok(()), writable)?;
     let mut loaded = model_and_log(&options.files)?;
     let test = test_runs(&mut loaded, options.test.as_deref())?;
     let bar = progress::bar("trying effects", 1);
@@ -28,7 +31,42 @@ pub(crate) fn run(options: &DiagnoseOptions) -> Result<(), Failure> {
     if options.json {
         output::json(&diagnosis)?;
     }
+    if let Some(path) = &options.html {
+        let shown = test.as_deref().unwrap_or(&loaded.runs);
+        let before = pictures(diagnosis.model.as_ref(), shown);
+        let after = pictures(diagnosis.candidates.first().map(|c| &c.model), shown);
+        let context = context(&loaded, options.test.as_deref(), "what the model lacks");
+        let page = diagnosis_page(&context, &diagnosis, before.as_ref(), after.as_ref());
+        save(path, &page)?;
+        output::note(&format!("wrote {}", path.display()));
+    }
     Ok(())
+}
+
+/// `model` held against `runs` for a page; none where it cannot be simulated over them, for then
+/// the page has enough to say without.
+pub(crate) fn pictures(model: Option<&Model>, runs: &[Run]) -> Option<Comparison> {
+    compare(model?, runs, &[]).ok()
+}
+
+/// What a page is about.
+pub(crate) fn context(loaded: &Loaded, test: Option<&std::path::Path>, what: &str) -> Context {
+    Context {
+        title: format!("{}: {what}", loaded.model.name),
+        model_name: loaded.model.name.clone(),
+        model_file: loaded.model_path.as_ref().map(|p| p.display().to_string()),
+        log_file: loaded.log_path.display().to_string(),
+        notes: test
+            .map(|test| {
+                format!(
+                    "Judged on {}, which nothing was fitted to; so are the pictures.",
+                    test.display()
+                )
+            })
+            .into_iter()
+            .collect(),
+        command: output::command_line(),
+    }
 }
 
 /// The runs of a test recording, which must measure what the log measures; its faults join those

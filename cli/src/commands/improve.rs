@@ -2,14 +2,17 @@
 
 use loopsight_core::config::{Source, Step};
 use loopsight_diagnosis::{Fit, Improvement, improve};
+use loopsight_report::{improvement_page, save};
 
 use crate::arguments::ImproveOptions;
-use crate::commands::diagnose::{sentence, test_runs};
+use crate::commands::diagnose::{context, pictures, sentence, test_runs};
 use crate::failure::Failure;
-use crate::load::{model_and_log, save_text};
+use crate::load::{model_and_log, save_text, writable};
 use crate::{output, progress};
 
 pub(crate) fn run(options: &ImproveOptions) -> Result<(), Failure> {
+    options.output.as_deref().map_or(Ok(()), writable)?;
+    options.html.as_deref().map_or(Ok(()), writable)?;
     let mut loaded = model_and_log(&options.files)?;
     let test = test_runs(&mut loaded, options.test.as_deref())?;
     let bar = progress::bar("round 1", 1);
@@ -35,6 +38,16 @@ pub(crate) fn run(options: &ImproveOptions) -> Result<(), Failure> {
             path,
             &best_text(&loaded.source, loaded.model.effects.len(), best),
         )?;
+    }
+    if let Some(path) = &options.html {
+        let shown = test.as_deref().unwrap_or(&loaded.runs);
+        let first = improvement.diagnoses.first();
+        let before = pictures(first.and_then(|d| d.model.as_ref()), shown);
+        let after = pictures(improvement.best.as_ref().map(|b| &b.model), shown);
+        let context = context(&loaded, options.test.as_deref(), "what was missing");
+        let page = improvement_page(&context, &improvement, before.as_ref(), after.as_ref());
+        save(path, &page)?;
+        output::note(&format!("wrote {}", path.display()));
     }
     Ok(())
 }

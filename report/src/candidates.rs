@@ -1,0 +1,186 @@
+//! The explanations that were tried, best first, with the evidence for each.
+
+use loopsight_core::registry;
+use loopsight_diagnosis::{Diagnosis, Estimate, Explanation};
+
+use crate::bars::{Line, Scale};
+use crate::conclusion::{effect_name, found, place_name};
+use crate::html::{escape, identifier, table};
+use crate::numbers::{percent, quantity, show, with_error};
+
+/// Explanations that are there at once; the others unfold.
+const SHOWN: usize = 5;
+
+/// The lines that errors of a diagnosis are held against.
+pub(crate) fn lines(diagnosis: &Diagnosis) -> [Line; 2] {
+    [
+        Line {
+            name: "the model as it is",
+            class: "nominal",
+            value: diagnosis.nominal.nrmse,
+        },
+        Line {
+            name: "noise and resolution alone",
+            class: "floor",
+            value: diagnosis.floor.nrmse,
+        },
+    ]
+}
+
+/// All explanations of a diagnosis.
+pub(crate) fn candidates(diagnosis: &Diagnosis) -> String {
+    let all = &diagnosis.candidates;
+    if all.is_empty() {
+        return "<p>No effect was tried.</p>\n".into();
+    }
+    let scale = Scale::new(
+        all.iter().map(|c| c.nrmse),
+        diagnosis.nominal.nrmse,
+        &lines(diagnosis),
+    );
+    let believed = found(diagnosis);
+    let rows: Vec<String> = all
+        .iter()
+        .enumerate()
+        .map(|(at, c)| row(at, c, believed, &scale))
+        .collect();
+    let (shown, more) = rows.split_at(rows.len().min(SHOWN));
+    let mut out = scale.legend(&[(
+        "error",
+        "error of the free run with the effect added, on data not fitted to",
+    )]);
+    out.push_str(&format!("<div class=\"candidates\">{}", shown.concat()));
+    if !more.is_empty() {
+        out.push_str(&format!(
+            "<details class=\"more\"><summary>{} more that were fitted to the end</summary>{}</details>",
+            more.len(),
+            more.concat()
+        ));
+    }
+    out + "</div>\n"
+}
+
+fn row(
+    at: usize,
+    explanation: &Explanation,
+    believed: Option<&Explanation>,
+    scale: &Scale,
+) -> String {
+    let badge = match believed {
+        Some(best) if best.place == explanation.place => {
+            "<span class=\"badge best\">missing</span>"
+        }
+        Some(best) if best.indistinguishable_from.contains(&explanation.place) => {
+            "<span class=\"badge\">not told apart from the first</span>"
+        }
+        _ => "",
+    };
+    let short: Vec<String> = explanation
+        .parameters
+        .iter()
+        .map(|(name, e)| format!("<span>{}</span>", in_short(name, e)))
+        .collect();
+    let open = if at == 0 && believed.is_some() {
+        " open"
+    } else {
+        ""
+    };
+    format!(
+        "<details class=\"candidate\"{open}><summary><span class=\"name\"><b>{}</b> {badge}<br>\
+         <span class=\"soft\">{}</span></span>{}<span class=\"amount\"><b>{}</b><br>\
+         <span class=\"soft\">significance {}</span></span>\
+         <span class=\"short\">{}</span></summary>{}</details>\n",
+        escape(&effect_name(&explanation.place.effect)),
+        identifier(&explanation.place.at.join(", ")),
+        scale.bar(&[("error", explanation.nrmse)]),
+        percent(explanation.nrmse),
+        show(explanation.significance, 3),
+        short.join(" "),
+        about(explanation),
+    )
+}
+
+/// `level 1.20 ± 0.02 V`, as HTML.
+fn in_short(name: &str, e: &Estimate) -> String {
+    let (value, _) = with_error(e.value, e.std_error.unwrap_or(f64::NAN));
+    let value = match e.interval95 {
+        Some([low, high]) if low.is_finite() && high.is_finite() => {
+            format!("{value}\u{a0}±\u{a0}{}", show((high - low) / 2.0, 2))
+        }
+        _ => value,
+    };
+    format!(
+        "{} {}",
+        identifier(name),
+        escape(&quantity(&value, &e.unit))
+    )
+}
+
+/// The parameters and what the library knows of the effect.
+fn about(explanation: &Explanation) -> String {
+    let mut out = String::from("<div class=\"about-effect\">");
+    if !explanation.parameters.is_empty() {
+        out.push_str(&parameters(explanation));
+    }
+    let meta = registry::effects()
+        .into_iter()
+        .find(|meta| meta.id == explanation.place.effect);
+    let mut items = Vec::new();
+    if let Some(meta) = meta {
+        items.push(("What it is", escape(meta.summary)));
+    }
+    items.push(("How it shows", escape(&explanation.note)));
+    if let Some(meta) = meta {
+        items.push(("What helps", escape(meta.remedy)));
+        items.push((
+            "Equation",
+            format!("<code>{}</code>", escape(meta.equation)),
+        ));
+        items.push(("From", escape(meta.reference)));
+    }
+    if !explanation.indistinguishable_from.is_empty() {
+        let others: Vec<String> = explanation
+            .indistinguishable_from
+            .iter()
+            .map(place_name)
+            .collect();
+        items.push(("Not told apart from", escape(&others.join("; "))));
+    }
+    out.push_str("<dl>");
+    for (term, text) in items.iter().filter(|(_, text)| !text.is_empty()) {
+        out.push_str(&format!("<dt>{term}</dt><dd>{text}</dd>"));
+    }
+    out + "</dl></div>"
+}
+
+fn parameters(explanation: &Explanation) -> String {
+    let rows: Vec<Vec<String>> = explanation
+        .parameters
+        .iter()
+        .map(|(name, e)| {
+            let error = e.std_error.unwrap_or(f64::NAN);
+            let interval = match e.interval95 {
+                Some([low, high]) => quantity(
+                    &format!(
+                        "{} … {}",
+                        with_error(low, error).0,
+                        with_error(high, error).0
+                    ),
+                    &e.unit,
+                ),
+                None => "–".into(),
+            };
+            vec![
+                identifier(name),
+                escape(&quantity(&with_error(e.value, error).0, &e.unit)),
+                escape(&interval),
+                escape(e.verdict.text()),
+            ]
+        })
+        .collect();
+    table(
+        &["parameter", "value", "95 % interval", "what the data say"],
+        &[false, true, true, false],
+        &rows,
+    )
+}
