@@ -1,0 +1,185 @@
+//! Improving blind: how close the improved model comes to the floor, two effects at once, and
+//! small friction.
+//!
+//! `cargo run --release -p loopsight-tests --example blind_improve -- [floor] [pairs] [small]`
+//!
+//! * `floor`: one effect each; the free-run error of the improved model on an unseen multi-level
+//!   recording over the error that counting alone leaves there.
+//! * `pairs`: two effects hidden at once; both must be named.
+//! * `small`: friction of 3 % of full drive, ten seeds.
+
+use loopsight_core::model::Model;
+use loopsight_diagnosis::{Improvement, improve};
+use loopsight_hidden::{Experiment, Hidden, Recording, record_with};
+use loopsight_plants as _;
+use rayon::prelude::*;
+
+/// Windings of a motor with an ironless rotor, s.
+const WINDINGS: f64 = 1e-4;
+
+const PAIRS: [(Hidden, Hidden); 12] = [
+    (Hidden::CoulombFriction, Hidden::InputDelay),
+    (Hidden::CoulombFriction, Hidden::BatterySag),
+    (Hidden::CoulombFriction, Hidden::GainAsymmetry),
+    (Hidden::CoulombFriction, Hidden::ActuatorLag),
+    (Hidden::CoulombFriction, Hidden::GravitySlope),
+    (Hidden::CoulombFriction, Hidden::EncoderRipple),
+    (Hidden::ScrubFriction, Hidden::InputDelay),
+    (Hidden::QuadraticDrag, Hidden::InputOffset),
+    (Hidden::GainAsymmetry, Hidden::SensorDelay),
+    (Hidden::TorqueRipple, Hidden::CoulombFriction),
+    (Hidden::WheelRadiusMismatch, Hidden::CoulombFriction),
+    (Hidden::SensorOffset, Hidden::InputDelay),
+];
+
+fn main() {
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
+    let all = wanted.is_empty();
+    let does = |what: &str| all || wanted.iter().any(|w| w == what);
+    if does("small") {
+        small();
+    }
+    if does("pairs") {
+        pairs();
+    }
+    if does("floor") {
+        floor();
+    }
+}
+
+/// A log to learn from and a multi-level one that nothing is fitted to.
+fn logs(hidden: &[(Hidden, f64)], kind: Experiment, seed: u64) -> Option<(Recording, Recording)> {
+    let robot = hidden.first()?.0.home();
+    let log = record_with(robot, hidden, kind, seed, WINDINGS).ok()?;
+    let unseen = record_with(robot, hidden, Experiment::MultiLevel, 500 + seed, WINDINGS).ok()?;
+    Some((log, unseen))
+}
+
+/// Improves on `log` alone; the error of the best model on `unseen`, and its floor.
+fn improved(log: &Recording, unseen: &Recording) -> Option<(Improvement, f64, f64)> {
+    let (model, _) = Model::from_toml("hidden", &log.model_toml).ok()?;
+    let runs = [log.run.clone()];
+    let found = improve(&model, &runs, None, &[], &|_, _, _| {}).ok()?;
+    let best = &found.best.as_ref()?.model;
+    let error = loopsight_diagnosis::compare(best, &[unseen.run.clone()], &[])
+        .ok()?
+        .nrmse;
+    let floor = unseen.floor();
+    Some((found, error, floor))
+}
+
+/// What was added, each with what the data could not tell from it.
+fn added(found: &Improvement) -> Vec<Vec<String>> {
+    found
+        .diagnoses
+        .iter()
+        .filter_map(|d| {
+            d.missing.as_ref()?;
+            let best = d.candidates.first()?;
+            let mut class = vec![best.place.effect.clone()];
+            class.extend(best.indistinguishable_from.iter().map(|p| p.effect.clone()));
+            Some(class)
+        })
+        .collect()
+}
+
+fn names(found: &Improvement) -> String {
+    found
+        .steps
+        .iter()
+        .filter_map(|s| s.added.as_ref())
+        .map(|p| format!("{}@{}", p.effect, p.at.join("+")))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+fn small() {
+    println!("friction of 0.27 V (3 % of 9 V), 25 s of encoder data, ten seeds");
+    let found: Vec<bool> = (1..=10u64)
+        .into_par_iter()
+        .map(|seed| {
+            let Some((log, unseen)) =
+                logs(&[(Hidden::CoulombFriction, 0.3)], Experiment::Prbs, seed)
+            else {
+                return false;
+            };
+            let Some((found, error, floor)) = improved(&log, &unseen) else {
+                return false;
+            };
+            let right = added(&found)
+                .first()
+                .is_some_and(|c| c.iter().any(|e| e == "coulomb_friction"));
+            println!(
+                "  seed {seed}: {} {}; unseen {:.2} %, floor {:.2} %",
+                if right { "found" } else { "MISSED" },
+                names(&found),
+                100.0 * error,
+                100.0 * floor
+            );
+            right
+        })
+        .collect();
+    println!(
+        "found in {} of {}\n",
+        found.iter().filter(|f| **f).count(),
+        found.len()
+    );
+}
+
+fn pairs() {
+    println!("two effects at once (mixed inputs)");
+    let named: Vec<bool> = PAIRS
+        .par_iter()
+        .map(|(a, b)| {
+            let Some((log, unseen)) = logs(&[(*a, 1.0), (*b, 1.0)], Experiment::Mixed, 7) else {
+                return false;
+            };
+            let Some((found, error, floor)) = improved(&log, &unseen) else {
+                return false;
+            };
+            let classes = added(&found);
+            let has = |id: &str| classes.iter().any(|c| c.iter().any(|e| e == id));
+            let both = has(a.id()) && has(b.id());
+            println!(
+                "  {} {} + {}: {}; unseen {:.2} %, floor {:.2} %",
+                if both { "both  " } else { "MISSED" },
+                a.id(),
+                b.id(),
+                names(&found),
+                100.0 * error,
+                100.0 * floor
+            );
+            both
+        })
+        .collect();
+    println!(
+        "both named in {} of {}\n",
+        named.iter().filter(|f| **f).count(),
+        named.len()
+    );
+}
+
+fn floor() {
+    println!("improved model on unseen multi-level input over the floor (log: mixed inputs)");
+    let ratios: Vec<(Hidden, f64)> = Hidden::ALL
+        .par_iter()
+        .filter_map(|effect| {
+            let (log, unseen) = logs(&[(*effect, 1.0)], Experiment::Mixed, 3)?;
+            let (found, error, floor) = improved(&log, &unseen)?;
+            println!(
+                "  {:22} {:.3}  ({:.2} % / {:.2} %)  {}",
+                effect.id(),
+                error / floor,
+                100.0 * error,
+                100.0 * floor,
+                names(&found)
+            );
+            Some((*effect, error / floor))
+        })
+        .collect();
+    let within = ratios.iter().filter(|r| r.1 <= 1.05).count();
+    println!(
+        "at most 1.05 times the floor in {within} of {}\n",
+        ratios.len()
+    );
+}
