@@ -45,10 +45,15 @@ pub(crate) fn candidates(diagnosis: &Diagnosis) -> String {
         .map(|(at, c)| row(at, c, believed, &scale))
         .collect();
     let (shown, more) = rows.split_at(rows.len().min(SHOWN));
-    let mut out = scale.legend(&[(
+    let all_bars = (
         "error",
-        "error of the free run with the effect added, on data not fitted to",
-    )]);
+        "error with the effect added, on data not fitted to",
+    );
+    let found_bars = ("found", "the same, of what explains these data");
+    let mut out = match believed {
+        Some(_) => scale.legend(&[all_bars, found_bars]),
+        None => scale.legend(&[all_bars]),
+    };
     out.push_str(&format!("<div class=\"candidates\">{}", shown.concat()));
     if !more.is_empty() {
         out.push_str(&format!(
@@ -66,14 +71,15 @@ fn row(
     believed: Option<&Explanation>,
     scale: &Scale,
 ) -> String {
-    let badge = match believed {
+    let (badge, bar) = match believed {
         Some(best) if best.place == explanation.place => {
-            "<span class=\"badge best\">missing</span>"
+            ("<span class=\"badge best\">missing</span>", "found")
         }
-        Some(best) if best.indistinguishable_from.contains(&explanation.place) => {
-            "<span class=\"badge\">not told apart from the first</span>"
-        }
-        _ => "",
+        Some(best) if best.indistinguishable_from.contains(&explanation.place) => (
+            "<span class=\"badge\">not told apart from the first</span>",
+            "found",
+        ),
+        _ => ("", "error"),
     };
     let short: Vec<String> = explanation
         .parameters
@@ -92,12 +98,23 @@ fn row(
          <span class=\"short\">{}</span></summary>{}</details>\n",
         escape(&effect_name(&explanation.place.effect)),
         identifier(&explanation.place.at.join(", ")),
-        scale.bar(&[("error", explanation.nrmse)]),
+        scale.bar(&[(bar, explanation.nrmse)]),
         percent(explanation.nrmse),
-        show(explanation.significance, 3),
+        in_tenths(explanation.significance),
         short.join(" "),
         about(explanation),
     )
+}
+
+/// A number of standard errors: tenths are enough, and beyond a hundred none.
+fn in_tenths(significance: f64) -> String {
+    if !significance.is_finite() {
+        "–".into()
+    } else if significance < 99.95 {
+        format!("{significance:.1}")
+    } else {
+        format!("{significance:.0}")
+    }
 }
 
 /// `level 1.20 ± 0.02 V`, as HTML.

@@ -5,7 +5,7 @@ use loopsight_recordings::{Fault, Severity};
 
 use crate::chart::{Chart, Role};
 use crate::errors::{errors, residual, rms, signal};
-use crate::html::{escape, identifier, list, table};
+use crate::html::{escape, identifier, list, marked, table};
 use crate::numbers::{axis, plain, quantity, show, tenths};
 use crate::page::{Context, page, section};
 use crate::scatter;
@@ -64,7 +64,7 @@ pub(crate) fn faults(faults: &[Fault], done: &str) -> String {
             format!(
                 "<li{grave}><b>{}</b>{signal}{run}: {}</li>",
                 escape(&kind),
-                escape(&fault.detail)
+                marked(&fault.detail)
             )
         })
         .collect();

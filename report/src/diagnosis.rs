@@ -6,7 +6,7 @@ use crate::beside::{self, Names};
 use crate::candidates;
 use crate::comparison::faults;
 use crate::conclusion::{effect_name, found, of_diagnosis};
-use crate::html::escape;
+use crate::html::marked;
 use crate::next;
 use crate::numbers::percent;
 use crate::page::{Context, page, section};
@@ -41,7 +41,17 @@ pub fn diagnosis_page(
     if let Some(before) = before {
         body.push_str(&against_measurements(before, after, names));
     }
-    body.push_str(&failures(&diagnosis.where_it_fails, before, after, names));
+    let title = match diagnosis.verdict {
+        Conclusion::NothingMissing => "What is left of the error",
+        _ => "Where it fails",
+    };
+    body.push_str(&failures(
+        title,
+        &diagnosis.where_it_fails,
+        before,
+        after,
+        names,
+    ));
     if !diagnosis.candidates.is_empty() {
         body.push_str(&section(
             "What could be missing",
@@ -62,7 +72,8 @@ pub fn diagnosis_page(
 /// What is to be seen in a list of explanations.
 pub(crate) const CANDIDATES: &str = "Every effect of the library was added to the model at every \
     place it fits, all parameters were fitted anew, and the free run was judged on data that the \
-    fit did not see. Best first; tap one to unfold what it is and what helps against it.";
+    fit did not see. First stands the simplest that is not clearly worse than the best, then the \
+    others by their error; tap one to unfold what it is and what helps against it.";
 
 /// Measured and models over time.
 pub(crate) fn against_measurements(
@@ -84,6 +95,7 @@ pub(crate) fn against_measurements(
 
 /// Where the model fails: statements with their shares, then the residual's dependences.
 pub(crate) fn failures(
+    title: &str,
     statements: &[Statement],
     before: Option<&Comparison>,
     after: Option<&Comparison>,
@@ -109,7 +121,7 @@ pub(crate) fn failures(
         return String::new();
     }
     section(
-        "Where it fails",
+        title,
         "Of the model as it is, with the best parameters it can have on this log.",
         &body,
     )
@@ -135,7 +147,7 @@ pub(crate) fn shares(statements: &[Statement]) -> String {
                  <rect class=\"error\" x=\"0\" y=\"2\" width=\"{width:.1}\" height=\"6\"/></svg>\
                  <b>{}</b><span>{}</span></li>",
                 percent(share),
-                escape(&s.statement)
+                marked(&sentence(&s.statement))
             )
         })
         .collect();
@@ -150,14 +162,22 @@ pub(crate) fn advice(advice: &[Advice]) -> String {
     if advice.is_empty() {
         return String::new();
     }
-    let items: String = advice
+    // One experiment may answer several questions.
+    let mut experiments: Vec<(&str, Vec<&str>)> = Vec::new();
+    for a in advice {
+        match experiments.iter_mut().find(|(e, _)| *e == a.experiment) {
+            Some((_, reasons)) => reasons.push(&a.why),
+            None => experiments.push((&a.experiment, vec![&a.why])),
+        }
+    }
+    let items: String = experiments
         .iter()
-        .map(|a| {
-            format!(
-                "<li><b>{}</b><br>{}</li>",
-                escape(&sentence(&a.experiment)),
-                escape(&format!("Because {}.", a.why.replace('`', "")))
-            )
+        .map(|(experiment, reasons)| {
+            let reasons: String = reasons
+                .iter()
+                .map(|why| format!("<br>{}", marked(&format!("Because {why}."))))
+                .collect();
+            format!("<li><b>{}</b>{reasons}</li>", marked(&sentence(experiment)))
         })
         .collect();
     section(
@@ -169,7 +189,6 @@ pub(crate) fn advice(advice: &[Advice]) -> String {
 
 /// A capital letter at the beginning and a full stop at the end.
 fn sentence(text: &str) -> String {
-    let text = text.replace('`', "");
     let mut chars = text.chars();
     match chars.next() {
         Some(first) => format!(
@@ -178,7 +197,7 @@ fn sentence(text: &str) -> String {
             chars.as_str(),
             if text.ends_with('.') { "" } else { "." }
         ),
-        None => text,
+        None => String::new(),
     }
 }
 

@@ -225,6 +225,8 @@ fn a_class_is_named_beside_the_verdict() {
         "1.200\u{a0}V</td><td class=\"number\">1.180 … 1.220\u{a0}V",
         "w = -level tanh(flow/width)",
         "Several levels.",
+        "loopsight experiment examples/twil/model.toml --separate \
+         coulomb_friction@wheel.right+wheel.left dead_zone@input.right -o experiment.csv",
         "3 more that were fitted to the end",
         "with coulomb friction",
         "\"role\":\"after\"",

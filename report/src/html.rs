@@ -21,6 +21,22 @@ pub(crate) fn identifier(text: &str) -> String {
     escape(text).replace('_', "_<wbr>").replace('.', ".<wbr>")
 }
 
+/// A sentence as HTML in which `` `names` `` stand as code.
+pub(crate) fn marked(text: &str) -> String {
+    let parts: Vec<&str> = text.split('`').collect();
+    let paired = parts.len() % 2 == 1;
+    let mut out = String::new();
+    for (at, part) in parts.iter().enumerate() {
+        let code = paired && at % 2 == 1;
+        if code && !part.is_empty() {
+            out.push_str(&format!("<code>{}</code>", identifier(part)));
+        } else {
+            out.push_str(&escape(part));
+        }
+    }
+    out
+}
+
 /// JSON that can stand inside a `<script>` element: no `<` can end it.
 pub(crate) fn json(value: &impl serde::Serialize) -> String {
     // Plain data of numbers and texts always serialises.
@@ -73,6 +89,8 @@ mod tests {
         assert_eq!(json(&"</script><!--"), "\"\\u003c/script>\\u003c!--\"");
         assert_eq!(json(&[f64::NAN, 1.5]), "[null,1.5]");
         assert_eq!(identifier("a_b.c<"), "a_<wbr>b.<wbr>c&lt;");
+        assert_eq!(marked("a ` is <1"), "a  is &lt;1");
+        assert_eq!(marked("`a<` is `` 1"), "<code>a&lt;</code> is  1");
         assert_eq!(list(&["<x>".into()]), "<ul><li>&lt;x&gt;</li></ul>\n");
     }
 

@@ -48,8 +48,13 @@ pub fn improvement_page(
     if let Some(before) = before {
         body.push_str(&against_measurements(before, after, names));
     }
+    let title = if changed {
+        "Where it failed"
+    } else {
+        "Where it fails"
+    };
     let statements = first.map_or(&[][..], |d| &d.where_it_fails);
-    body.push_str(&failures(statements, before, after, names));
+    body.push_str(&failures(title, statements, before, after, names));
     if let (Some(last), true) = (last, changed) {
         let left = shares(&last.where_it_fails);
         if !left.is_empty() {

@@ -1,6 +1,6 @@
 //! What to type next.
 
-use loopsight_diagnosis::{Conclusion, Diagnosis, Improvement};
+use loopsight_diagnosis::{Conclusion, Diagnosis, Improvement, Place};
 
 use crate::conclusion::{effect_name, found};
 use crate::html::escape;
@@ -31,6 +31,21 @@ pub(crate) fn after_diagnosis(context: &Context, diagnosis: &Diagnosis) -> Vec<H
         (Conclusion::EffectMissing, Some(best)) => {
             let mut hints = Vec::new();
             if let Some(model) = &files.model {
+                for other in &best.indistinguishable_from {
+                    hints.push((
+                        format!(
+                            "See whether an experiment can tell {} from {}, and plan it.",
+                            effect_name(&best.place.effect),
+                            effect_name(&other.effect)
+                        ),
+                        format!(
+                            "loopsight experiment {} --separate {} {} -o experiment.csv",
+                            word(model),
+                            word(&at_channels(&best.place)),
+                            word(&at_channels(other))
+                        ),
+                    ));
+                }
                 let new = with_suffix(model, &best.place.effect);
                 let at: String = best
                     .place
@@ -66,8 +81,12 @@ pub(crate) fn after_diagnosis(context: &Context, diagnosis: &Diagnosis) -> Vec<H
                     ),
                 ));
             }
+            let both = match files.model {
+                Some(_) => "Or let the program add and fit, until nothing more is missing.",
+                None => "Let the program add effects and fit, until nothing more is missing.",
+            };
             hints.push((
-                "Or let both be done, again and again until nothing more is missing.".into(),
+                both.into(),
                 format!(
                     "loopsight improve {} -o {} --html improvement.html",
                     files.all(),
@@ -119,6 +138,15 @@ pub(crate) fn after_improvement(context: &Context, improvement: &Improvement) ->
         ),
     ));
     hints
+}
+
+/// `effect@channel+channel`.
+fn at_channels(place: &Place) -> String {
+    if place.at.is_empty() {
+        place.effect.clone()
+    } else {
+        format!("{}@{}", place.effect, place.at.join("+"))
+    }
 }
 
 fn again(files: &Files, verb: &str) -> Vec<Hint> {
