@@ -1,7 +1,9 @@
 //! What a diagnosis or an improvement concludes, in sentences.
 
 use loopsight_core::registry;
-use loopsight_diagnosis::{Conclusion, Diagnosis, Explanation, Improvement, Place};
+use loopsight_diagnosis::{
+    Conclusion, Diagnosis, Explanation, Improvement, Place, Verdict as Fitted,
+};
 
 use crate::html::escape;
 use crate::numbers::percent;
@@ -234,6 +236,25 @@ pub(crate) fn added(improvement: &Improvement) -> Vec<Place> {
     }
 }
 
+/// Which parameters of the added effects the data do not pin.
+fn doubtful(improvement: &Improvement, added: &[Place]) -> Option<String> {
+    let of_effect = |name: &str| added.iter().any(|place| name.starts_with(&place.effect));
+    let names: Vec<&str> = improvement
+        .best
+        .iter()
+        .flat_map(|best| &best.parameters)
+        .filter(|(name, e)| of_effect(name) && !matches!(e.verdict, Fitted::Good | Fitted::Held))
+        .map(|(name, _)| name.as_str())
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "The log does not pin {}: take the effect for likely, not its number, until another \
+             recording confirms it.",
+            both(&names)
+        )
+    })
+}
+
 /// What an improvement concludes.
 pub(crate) fn of_improvement(improvement: &Improvement) -> Verdict {
     let Some(last) = improvement.diagnoses.last() else {
@@ -291,7 +312,12 @@ pub(crate) fn of_improvement(improvement: &Improvement) -> Verdict {
             ),
             rest,
         ],
-        alike: improvement.diagnoses.iter().flat_map(alike).collect(),
+        alike: improvement
+            .diagnoses
+            .iter()
+            .flat_map(alike)
+            .chain(doubtful(improvement, &added))
+            .collect(),
         class,
     }
 }

@@ -249,6 +249,7 @@ fn the_error_falls_step_by_step() {
     let page = without_library(&page);
     for text in [
         "<b>The model as it is</b>",
+        "The log does not pin coulomb_friction.level:",
         "<b>+ coulomb friction</b>",
         "noise and resolution alone, on data not fitted to: 1.9\u{a0}%",
         "Round 2",
