@@ -1,0 +1,194 @@
+//! What a diagnosis concludes: a few blind recordings, faulty logs, and logs that cannot tell.
+//! The whole blind table is `cargo run --release -p loopsight-tests --example blind_table`.
+
+use loopsight_core::model::Model;
+use loopsight_core::run::Run;
+use loopsight_diagnosis::{Conclusion, Diagnosis, diagnose};
+use loopsight_hidden::{Experiment, Hidden, Recording, record_with};
+use loopsight_plants as _;
+
+/// Windings of a motor with an ironless rotor, s.
+const WINDINGS: f64 = 1e-4;
+
+fn log(hidden: &[(Hidden, f64)], kind: Experiment, seed: u64) -> Recording {
+    let robot = hidden
+        .first()
+        .map_or(loopsight_hidden::Robot::Twil, |h| h.0.home());
+    record_with(robot, hidden, kind, seed, WINDINGS).unwrap()
+}
+
+fn model(log: &Recording) -> Model {
+    Model::from_toml("hidden", &log.model_toml).unwrap().0
+}
+
+fn judge(log: &Recording, test: Option<&Recording>) -> Diagnosis {
+    let tests = test.map(|t| vec![t.run.clone()]);
+    diagnose(
+        &model(log),
+        &[log.run.clone()],
+        tests.as_deref(),
+        &[],
+        &|_, _| {},
+    )
+    .unwrap()
+}
+
+fn finds(effect: Hidden, size: f64, seed: u64) {
+    let recording = log(&[(effect, size)], Experiment::Prbs, seed);
+    let unseen = log(&[(effect, size)], Experiment::MultiLevel, 100 + seed);
+    let diagnosis = judge(&recording, Some(&unseen));
+    assert_eq!(
+        diagnosis.verdict,
+        Conclusion::EffectMissing,
+        "{}",
+        effect.id()
+    );
+    let best = &diagnosis.candidates[0];
+    let class = std::iter::once(&best.place).chain(&best.indistinguishable_from);
+    let found: Vec<&str> = class.map(|p| p.effect.as_str()).collect();
+    assert!(
+        found.contains(&effect.id()),
+        "{} found as {found:?}",
+        effect.id()
+    );
+    assert!(
+        best.nrmse < 1.1 * unseen.floor(),
+        "{}: {}",
+        effect.id(),
+        best.nrmse
+    );
+    for quantity in &recording.truth.hidden[0].fitted {
+        if let (Some(p), true) = (best.parameters.get(quantity.name), found[0] == effect.id()) {
+            let off = (p.value - quantity.value).abs();
+            assert!(
+                off < 0.05 * quantity.value.abs(),
+                "{}: {} ",
+                quantity.name,
+                p.value
+            );
+        }
+    }
+}
+
+#[test]
+fn friction_is_found_with_its_level() {
+    finds(Hidden::CoulombFriction, 1.0, 1);
+}
+
+#[test]
+fn small_friction_is_found() {
+    let recording = log(&[(Hidden::CoulombFriction, 0.3)], Experiment::Prbs, 4);
+    let diagnosis = judge(&recording, None);
+    let missing = diagnosis.missing.unwrap();
+    assert_eq!(missing.effect, "coulomb_friction");
+    assert_eq!(missing.at, ["wheel.right", "wheel.left"]);
+}
+
+#[test]
+fn a_late_sensor_is_a_class_with_a_late_command() {
+    finds(Hidden::SensorDelay, 1.0, 2);
+}
+
+#[test]
+fn a_stronger_motor_and_an_eccentric_encoder_are_found() {
+    finds(Hidden::GainAsymmetry, 1.0, 3);
+    finds(Hidden::EncoderRipple, 1.0, 3);
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is_missing() {
+    for (kind, seed) in [(Experiment::Prbs, 11), (Experiment::Mixed, 12)] {
+        let clean = log(&[], kind, seed);
+        assert_eq!(judge(&clean, None).verdict, Conclusion::NothingMissing);
+    }
+}
+
+/// A dead zone under two levels is a gain: the log shows nothing, the test does.
+#[test]
+fn a_log_that_cannot_show_it_is_called_insufficient() {
+    let recording = log(&[(Hidden::DeadZone, 1.0)], Experiment::Prbs, 5);
+    let unseen = log(&[(Hidden::DeadZone, 1.0)], Experiment::MultiLevel, 105);
+    let diagnosis = judge(&recording, Some(&unseen));
+    assert_eq!(diagnosis.verdict, Conclusion::DataInsufficient);
+    assert!(!diagnosis.advice.is_empty());
+}
+
+#[test]
+fn constant_inputs_and_short_logs_are_refused_with_the_reason() {
+    let mut recording = log(&[], Experiment::Prbs, 6);
+    let short = Run {
+        ..recording.run.part(0..150)
+    };
+    let refused = diagnose(&model(&recording), &[short], None, &[], &|_, _| {}).unwrap();
+    assert_eq!(refused.verdict, Conclusion::DataInsufficient);
+    assert!(
+        refused.advice[0].why.contains("1.49 s"),
+        "{:?}",
+        refused.advice
+    );
+    for row in recording.run.inputs.chunks_exact_mut(2) {
+        row[0] = 5.0;
+    }
+    let refused = judge(&recording, None);
+    assert_eq!(refused.verdict, Conclusion::DataInsufficient);
+    assert!(
+        refused.advice[0].why.contains("voltage_right"),
+        "{:?}",
+        refused.advice
+    );
+}
+
+/// The number of threads must not show in the result.
+#[test]
+fn one_thread_or_two_find_the_same() {
+    let recording = log(&[(Hidden::QuadraticDrag, 1.0)], Experiment::Mixed, 8);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        serde_json::to_string(&pool.install(|| judge(&recording, None))).unwrap()
+    };
+    assert_eq!(with(1), with(2));
+}
+
+/// Real logs, where they are: friction of the drivetrains and of the flywheel.
+#[test]
+fn real_logs_show_their_friction() {
+    let Ok(folder) = std::env::var("LOOPSIGHT_DATA") else {
+        println!("LOOPSIGHT_DATA is unset: real logs are not tried");
+        return;
+    };
+    for (file, low, high) in [
+        ("team4277-drivetrain.json", 0.55, 0.75),
+        ("denham-flywheel.json", 0.6, 0.8),
+    ] {
+        let path = std::path::Path::new(&folder).join("frc").join(file);
+        let source = loopsight_recordings::read(&path).unwrap();
+        let (mut model, _) = Model::from_toml(file, &source.model_toml().unwrap()).unwrap();
+        let signals: Vec<_> = model
+            .plant
+            .states
+            .iter()
+            .chain(model.plant.outputs)
+            .copied()
+            .collect();
+        let recording =
+            loopsight_recordings::map(&source, model.plant.inputs, &signals, &model.log).unwrap();
+        let measured: Vec<_> = recording
+            .measured
+            .iter()
+            .map(|m| (m.id.clone(), m.sensor.clone()))
+            .collect();
+        model.measure(&measured).unwrap();
+        let found = diagnose(&model, &recording.runs, None, &[], &|_, _| {}).unwrap();
+        assert_eq!(found.verdict, Conclusion::EffectMissing, "{file}");
+        let level = found
+            .candidates
+            .iter()
+            .filter(|c| c.place.effect == "coulomb_friction")
+            .filter_map(|c| c.parameters.get("level"))
+            .find(|p| p.unit == "V" && (low..high).contains(&p.value));
+        assert!(level.is_some(), "{file}: {:?}", found.missing);
+    }
+}
