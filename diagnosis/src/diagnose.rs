@@ -12,7 +12,7 @@ use crate::advice::{self, Advice};
 use crate::candidates::{Candidate, candidates};
 use crate::choose::choose;
 use crate::conclusion::{Conclusion, Diagnosis, Explanation, Level, Place};
-use crate::fit::{Fit, FitError, FitSettings, Verdict};
+use crate::fit::{Estimate, Fit, FitError, FitSettings, Verdict};
 use crate::floor::floor;
 use crate::holdout::Holdout;
 use crate::judge::{Losses, advantage, nrmse, significance};
@@ -215,7 +215,8 @@ pub(crate) fn diagnose_above(
         // Down to the noise, or a good part of what there was to explain.
         let complete = nrmse(&judged.rank) < COMPLETE * floor && explained > MATTERS * floor;
         let matters = complete || explained > (MATTERS * floor).max(least);
-        (earned && significance > SIGNIFICANT && matters).then(|| explanations[0].place.clone())
+        (earned && significance > SIGNIFICANT && matters && determined(&explanations[0]))
+            .then(|| explanations[0].place.clone())
     });
     // The log explains itself and the test does not: what is missing never showed in the log.
     let floor_fit = self::floor(model, runs);
@@ -244,6 +245,13 @@ pub(crate) fn diagnose_above(
         model: Some(fitted_nominal),
         nominal_fit,
     })
+}
+
+/// Whether the log determines anything of the effect: what it cannot tell from the plant's own
+/// parameters is not found, however well a test recording speaks of it.
+fn determined(explanation: &Explanation) -> bool {
+    let says_nothing = |p: &Estimate| matches!(p.verdict, Verdict::Flat | Verdict::Dead);
+    !explanation.parameters.values().all(says_nothing)
 }
 
 fn refused(verdict: Conclusion, faults: &[Fault], advice: Vec<Advice>) -> Diagnosis {

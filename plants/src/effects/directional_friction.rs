@@ -42,7 +42,7 @@ impl Effect<5, 0> for DirectionalFriction {
         example: "[[effect]]\n[effect.directional_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel_forward = 0.6\nlevel_backward = 1.1\n",
         places: &[PlaceKind::Effort],
         reads: &[Role::Flow],
-        simpler: &["coulomb_friction", "viscous_friction"],
+        simpler: &["coulomb_friction", "scrub_friction", "viscous_friction"],
         parameters: &[
             Parameter::new("level_forward", "c_f", "channel", "dry friction forwards")
                 .within(0.0, f64::INFINITY)

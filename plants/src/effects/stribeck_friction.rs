@@ -39,7 +39,7 @@ impl Effect<4, 0> for StribeckFriction {
         example: "[[effect]]\n[effect.stribeck_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel = 0.8\nextra = 0.5\nspeed = 0.6\n",
         places: &[PlaceKind::Effort],
         reads: &[Role::Flow],
-        simpler: &["coulomb_friction"],
+        simpler: &["coulomb_friction", "scrub_friction"],
         parameters: &[
             Parameter::new("level", "c", "channel", "friction in motion")
                 .within(0.0, f64::INFINITY)
