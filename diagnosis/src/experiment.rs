@@ -14,19 +14,24 @@
 //! noise. A recording must also say what the noise is and leave data to judge by, so that an
 //! experiment is made long enough for `d = 20` rather than for the 5 of a single test.
 //!
-//! A parameter is pinned by the inputs that make its standard error least (c-optimality),
-//! `sqrt(cᵀ (JᵀJ)⁻¹ c)` with `J` the exact sensitivities over `σ`; without a question, those that
-//! make the largest relative standard error of all parameters least.
+//! A parameter is pinned by the inputs that make its standard error least (c-optimality), with `J`
+//! the exact sensitivities over `σ` and the noise of encoders coloured as rounding colours it;
+//! without a question, by those that make the largest relative standard error of all least:
+//!
+//! ```text
+//! s² = cᵀ (JᵀJ)⁻¹ Jᵀ cov(e) J (JᵀJ)⁻¹ c
+//! ```
 //!
 //! Assumptions: the model's values are near enough for its response to be; the robot starts at rest;
-//! the noise is white (that of encoder counts is smaller at low frequencies, so this is on the safe
-//! side); the chosen inputs are the best of a list, not of all there are.
+//! distances count the noise as white, as a diagnosis does (that of encoder counts is smaller at low
+//! frequencies); the chosen inputs are the best of a list, not of all there are.
 //!
 //! References: A. C. Atkinson, V. V. Fedorov (1975), "The design of experiments for discriminating
 //! between two rival models", Biometrika 62, 57–70; A. C. Atkinson, A. N. Donev (1992), "Optimum
 //! Experimental Designs", chapters 10 (c-, D-optimality) and 20 (T-optimality); L. Ljung (1999),
 //! "System Identification: Theory for the User", 2nd edition, chapter 13.
 
+mod plan;
 mod question;
 mod rival;
 mod shapes;
@@ -35,93 +40,13 @@ use loopsight_core::model::Model;
 use loopsight_core::registry::BuildError;
 use loopsight_core::sensor::Sensor;
 use rayon::prelude::*;
-use serde::Serialize;
 
-use crate::Place;
 use crate::prediction::signal_rms;
+pub use plan::{Considered, Drive, Limits, Plan, Promise, Question};
 pub use question::{QuestionError, place};
 use question::{Rivals, rivals};
 use rival::{information, response, rival, standard_errors};
 use shapes::Shape;
-
-/// What an experiment is to answer.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Question {
-    /// Which of two effects it is; `None`: whether it is there at all.
-    Separate(Place, Option<Place>),
-    /// The value of a parameter, by its name in the model.
-    Pin(String),
-    /// The values of all parameters that a fit estimates.
-    All,
-}
-
-/// What the robot allows.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// Largest magnitude of every input, in its SI unit.
-    pub limit: f64,
-    /// Sampling period, s.
-    pub period: f64,
-    /// Length of the experiment, s; `None`: as long as it must be.
-    pub duration: Option<f64>,
-}
-
-/// What an experiment promises.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Promise {
-    /// It answers the question.
-    Answers,
-    /// It would have to be longer.
-    TooShort,
-    /// No inputs answer the question.
-    CannotBeSeparated,
-}
-
-/// An experiment that was looked at.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Considered {
-    /// What it is.
-    pub experiment: String,
-    /// As [`Plan::detectability`], after 20 s (or the duration asked for).
-    pub detectability: f64,
-}
-
-/// An experiment, ready to be recorded.
-#[derive(Clone, Debug, Serialize)]
-pub struct Plan {
-    /// What it is; empty when no inputs answer the question.
-    pub experiment: String,
-    /// How long it takes, s.
-    pub duration_s: f64,
-    /// How long it has to take, s; infinite when no length is enough.
-    pub needed_s: f64,
-    /// The effects it separates.
-    pub separates: Vec<Place>,
-    /// The parameters it pins.
-    pub pins: Vec<String>,
-    /// Effects: their distance in standard deviations. Parameters: value (or noticeable change, if
-    /// larger or the value is zero) over the predicted standard error.
-    pub detectability: f64,
-    /// What it promises.
-    pub verdict: Promise,
-    /// Why this one, in words.
-    pub reason: String,
-    /// What was looked at, best first.
-    pub considered: Vec<Considered>,
-    /// The inputs over time.
-    #[serde(skip)]
-    pub drive: Drive,
-}
-
-/// Inputs over time.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Drive {
-    /// Instants, s.
-    pub time: Vec<f64>,
-    /// Inputs from each instant to the next, row by row.
-    pub inputs: Vec<f64>,
-}
 
 /// Length at which experiments are compared, s.
 const HORIZON: f64 = 20.0;
@@ -134,6 +59,10 @@ const PINNED: f64 = 100.0;
 /// Share of an effect's own distance that a rival must leave: below it the models are the same but
 /// for the errors of their integration, and no robot is its model to that precision.
 const SAME: f64 = 0.02;
+/// A signal moves if its root mean square is so many times its noise.
+const MOVES: f64 = 5.0;
+/// Beyond this length nothing is separated, s.
+const HOPELESS: f64 = 1e5;
 /// Gauss–Newton steps at the first look, and for the best.
 const STEPS: (usize, usize) = (2, 8);
 /// Experiments that are looked at twice.
@@ -232,7 +161,15 @@ impl<'m> Design<'m> {
                     .map(|start| rival(model, start, &run, &self.noise, steps))
                     .min_by(|a, b| a.total.total_cmp(&b.total))
             };
-            let own = rival(self.model, &self.model.values(), &run, &self.noise, steps);
+            // Whether an effect is there at all: a refit may hide it, so not after one.
+            let own_steps = if rivals.places.len() > 1 { steps } else { 0 };
+            let own = rival(
+                self.model,
+                &self.model.values(),
+                &run,
+                &self.noise,
+                own_steps,
+            );
             let far = least(&other.0, &other.1).filter(|d| d.total < own.total);
             let own_total = own.total;
             let far = far.unwrap_or(own);
@@ -255,6 +192,39 @@ impl<'m> Design<'m> {
             .unwrap_or_default()
     }
 
+    /// The shapes under which every signal moves that moves under the usual one: a recording in
+    /// which one does not carries no fit of the whole model.
+    fn moving(&self) -> Result<Vec<Shape>, BuildError> {
+        let moves = |shape: Shape| -> Result<Vec<bool>, BuildError> {
+            let run = response(
+                self.model,
+                &self.model.values(),
+                &self.drive(shape, HORIZON)?,
+            );
+            let power = |i: usize| {
+                (0..run.len())
+                    .map(|k| run.sample(k)[i].powi(2))
+                    .sum::<f64>()
+            };
+            let least = |i: usize| MOVES * self.noise[i] * (run.len() as f64).sqrt();
+            Ok((0..run.n_measured)
+                .map(|i| power(i).sqrt() > least(i))
+                .collect())
+        };
+        let usual = moves(Shape::usual(self.names.len()))?;
+        let mut shapes = Vec::new();
+        for shape in Shape::all(self.names.len()) {
+            if moves(shape)?
+                .iter()
+                .zip(&usual)
+                .all(|(here, usual)| *here || !usual)
+            {
+                shapes.push(shape);
+            }
+        }
+        Ok(shapes)
+    }
+
     fn separate(&self, rivals: &Rivals) -> Result<Plan, QuestionError> {
         let horizon = self.limits.duration.unwrap_or(HORIZON);
         let look = |shapes: &[Shape], steps: usize, starts: usize| {
@@ -268,7 +238,7 @@ impl<'m> Design<'m> {
             all.sort_by(|a, b| b.1.total.total_cmp(&a.1.total));
             Ok::<_, BuildError>(all)
         };
-        let first = look(&Shape::all(self.names.len()), STEPS.0, 1)?;
+        let first = look(&self.moving()?, STEPS.0, 1)?;
         let best: Vec<Shape> = first.iter().take(BEST).map(|(shape, _)| *shape).collect();
         let second = look(&best, STEPS.1, usize::MAX)?;
         let considered: Vec<Considered> = second
@@ -284,11 +254,13 @@ impl<'m> Design<'m> {
         };
         let mut needed = self.needed(&apart, horizon);
         let mut duration = horizon;
-        let same = apart.share < SAME || needed.is_infinite();
+        let same = apart.share < SAME || needed > HOPELESS;
         if self.limits.duration.is_none() && !same {
             // Refitted to a shorter recording a rival comes closer: once more at the new length.
-            for _ in 0..3 {
-                duration = needed.clamp(LENGTHS.0, LENGTHS.1).ceil();
+            let mut longest = LENGTHS.1;
+            for _ in 0..6 {
+                duration = needed.clamp(LENGTHS.0, longest).ceil();
+                longest = (2.0 * duration).min(LENGTHS.1);
                 apart = self.distance(rivals, &self.drive(shape, duration)?, STEPS.1, usize::MAX);
                 needed = self.needed(&apart, duration);
                 if apart.total.sqrt() >= SEPARATED || duration >= LENGTHS.1 {
@@ -385,7 +357,8 @@ impl<'m> Design<'m> {
                 .unwrap_or((f64::INFINITY, asked[0]))
         };
         let horizon = self.limits.duration.unwrap_or(HORIZON);
-        let mut all: Vec<(Shape, (f64, usize))> = Shape::all(self.names.len())
+        let mut all: Vec<(Shape, (f64, usize))> = self
+            .moving()?
             .par_iter()
             .map(|shape| Ok((*shape, worst(&self.drive(*shape, horizon)?))))
             .collect::<Result<_, BuildError>>()?;

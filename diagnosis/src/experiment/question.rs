@@ -321,10 +321,17 @@ impl Rivals {
         } else {
             "a disturbance by hand, another sensor, or a different load"
         };
+        let how = if self.places.len() < 2 || share > 0.5 {
+            "under every experiment that was tried an effect of this kind hides in the model's own parameters".to_owned()
+        } else {
+            format!(
+                "under every experiment that was tried the one, refitted, follows the other ({:.2} % of the effect are left)",
+                100.0 * share
+            )
+        };
         format!(
-            "{} cannot be separated with inputs alone: under every experiment that was tried the one, refitted, follows the other ({:.2} % of the effect are left). What would: {way}",
-            self.names(),
-            100.0 * share
+            "{} cannot be separated with inputs alone: {how}. What would: {way}",
+            self.names()
         )
     }
 }

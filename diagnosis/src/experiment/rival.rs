@@ -2,9 +2,11 @@
 
 use loopsight_core::model::{Model, pseudo_inverse};
 use loopsight_core::run::Run;
+use loopsight_core::sensor::Sensor;
 use nalgebra::{DMatrix, DVector};
 
 use crate::experiment::Drive;
+use crate::noise::Arma;
 use crate::prediction::{predict, residuals, sensitivities};
 
 /// What separates two models under one drive, in units of the sensors' noise.
@@ -96,58 +98,90 @@ pub(crate) fn rival(
     Distance::of(&left, noise.len())
 }
 
-/// `(JᵀJ)` of the parameters `free` under `drive`, in units of their scales and of the noise.
+/// What a recording says about parameters, in units of their scales and of the noise.
+pub(crate) struct Information {
+    /// `JᵀJ`.
+    gram: DMatrix<f64>,
+    /// `Jᵀ cov(e) J`.
+    meat: DMatrix<f64>,
+}
+
+/// What `drive` says about the parameters `free`.
+///
+/// Noise is white but for encoders: their rounding is differenced, `e(k) = q(k) - q(k-1)`, and so
+/// nearly absent from slow motion.
 pub(crate) fn information(
     model: &Model,
     values: &[f64],
     drive: &Drive,
     free: &[usize],
     noise: &[f64],
-) -> DMatrix<f64> {
+) -> Information {
     let run = response(model, values, drive);
     let x0 = vec![0.0; model.n_states()];
     let s = sensitivities(model, values, &x0, &run, free, &[]);
     let jacobian = scaled(model, free, s.jacobian, noise);
-    jacobian.tr_mul(&jacobian)
+    let mut coloured = jacobian.clone();
+    let n = noise.len();
+    for mut column in coloured.column_iter_mut() {
+        for (signal, measured) in model.measured.iter().enumerate() {
+            if matches!(measured.sensor, Sensor::EncoderCounts(_)) {
+                let mut own: Vec<f64> = column.iter().skip(signal).step_by(n).copied().collect();
+                DIFFERENCED.transpose(&mut own);
+                for (k, value) in own.into_iter().enumerate() {
+                    column[k * n + signal] = value * DIFFERENCED.variance.sqrt();
+                }
+            }
+        }
+    }
+    Information {
+        gram: jacobian.tr_mul(&jacobian),
+        meat: coloured.tr_mul(&coloured),
+    }
 }
 
-/// Standard errors from an information matrix; infinite where a parameter, or a combination it is
-/// part of, has no influence.
-pub(crate) fn standard_errors(information: &DMatrix<f64>) -> Vec<f64> {
-    let n = information.nrows();
-    if information.iter().any(|v| !v.is_finite()) {
+/// Differenced rounding of unit variance.
+const DIFFERENCED: Arma = Arma {
+    a: 0.0,
+    c: -1.0,
+    variance: 0.5,
+};
+
+/// Standard errors of a least-squares fit, `(JᵀJ)⁻¹ Jᵀ cov(e) J (JᵀJ)⁻¹`; infinite where a
+/// parameter, or a combination it is part of, has no influence.
+pub(crate) fn standard_errors(information: &Information) -> Vec<f64> {
+    let Information { gram, meat } = information;
+    let n = gram.nrows();
+    if gram.iter().chain(meat).any(|v| !v.is_finite()) {
         return vec![f64::INFINITY; n];
     }
     // To a unit diagonal first: what is small by its unit is not flat.
-    let size: Vec<f64> = (0..n).map(|i| information[(i, i)].sqrt()).collect();
-    let unit = DMatrix::from_fn(n, n, |i, j| {
-        let product = size[i] * size[j];
-        if product > 0.0 {
-            information[(i, j)] / product
-        } else {
-            0.0
-        }
-    });
-    let eigen = unit.symmetric_eigen();
+    let size: Vec<f64> = (0..n).map(|i| gram[(i, i)].sqrt()).collect();
+    let unit = |of: &DMatrix<f64>| {
+        DMatrix::from_fn(n, n, |i, j| {
+            let product = size[i] * size[j];
+            if product > 0.0 {
+                of[(i, j)] / product
+            } else {
+                0.0
+            }
+        })
+    };
+    let eigen = unit(gram).symmetric_eigen();
+    let inverted = eigen
+        .eigenvalues
+        .map(|v| if v > FLAT { 1.0 / v } else { 0.0 });
+    let vectors = &eigen.eigenvectors;
+    let inverse = vectors * DMatrix::from_diagonal(&inverted) * vectors.transpose();
+    let covariance = &inverse * unit(meat) * &inverse;
     (0..n)
         .map(|i| {
-            if size[i] == 0.0 {
-                return f64::INFINITY;
+            let flat = (0..n).any(|k| inverted[k] == 0.0 && vectors[(i, k)].powi(2) > 1e-6);
+            if size[i] == 0.0 || flat {
+                f64::INFINITY
+            } else {
+                covariance[(i, i)].max(0.0).sqrt() / size[i]
             }
-            let variance: f64 = (0..n)
-                .map(|k| {
-                    let part = eigen.eigenvectors[(i, k)].powi(2);
-                    let value = eigen.eigenvalues[k];
-                    if value > FLAT {
-                        part / value
-                    } else if part > 1e-6 {
-                        f64::INFINITY
-                    } else {
-                        0.0
-                    }
-                })
-                .sum();
-            variance.sqrt() / size[i]
         })
         .collect()
 }

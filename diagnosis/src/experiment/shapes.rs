@@ -8,8 +8,9 @@
 //! Seven shapes: fast and slow binary sequences (all frequencies, one amplitude), many and small
 //! levels (amplitudes), slow ramps through zero with rests (thresholds, breakaway), steps with
 //! coasting (transients, friction without drive), a chirp (frequencies one after the other). With
-//! several inputs each of them comes three times: every input its own, all equal (a straight run of
-//! a vehicle) and in turns opposite (a turn on the spot). All seeds are fixed.
+//! several inputs each of them comes four times: every input its own, all equal (a straight run of
+//! a vehicle), in turns opposite (a turn on the spot), and the last two in alternation. All seeds
+//! are fixed.
 //!
 //! Reference: L. Ljung (1999), "System Identification: Theory for the User", 2nd edition, section
 //! 13.3.
@@ -21,6 +22,9 @@ use crate::experiment::Drive;
 
 /// Without command at the beginning and at the end, s.
 const REST: f64 = 0.5;
+
+/// Length of the straight runs and of the turns of an alternation, s: whole steps and levels.
+const BLOCK: f64 = 2.4;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -43,6 +47,8 @@ enum Pattern {
     Equal,
     /// Inputs in turns opposite.
     Opposite,
+    /// Equal and opposite in alternation.
+    Alternating,
 }
 
 /// A shape for all inputs.
@@ -65,7 +71,12 @@ impl Shape {
             Kind::SlowBinary,
         ];
         let patterns: &[Pattern] = if inputs > 1 {
-            &[Pattern::Own, Pattern::Equal, Pattern::Opposite]
+            &[
+                Pattern::Own,
+                Pattern::Alternating,
+                Pattern::Equal,
+                Pattern::Opposite,
+            ]
         } else {
             &[Pattern::Single]
         };
@@ -103,6 +114,7 @@ impl Shape {
             Pattern::Own => ", every input its own",
             Pattern::Equal => ", inputs equal (straight)",
             Pattern::Opposite => ", inputs opposite (turning on the spot)",
+            Pattern::Alternating => ", straight and turning on the spot in alternation",
         };
         format!("{kind}{pattern}")
     }
@@ -127,9 +139,12 @@ impl Shape {
             .iter()
             .flat_map(|t| {
                 let on = *t > REST - 1e-9 && *t < end;
-                sequences
-                    .iter()
-                    .map(move |s| if on { s.sample(t - REST) } else { 0.0 })
+                let turning = self.pattern == Pattern::Alternating
+                    && ((t - REST) / BLOCK + 1e-9).rem_euclid(2.0) >= 1.0;
+                sequences.iter().enumerate().map(move |(i, s)| {
+                    let sign = if turning && i % 2 == 1 { -1.0 } else { 1.0 };
+                    if on { sign * s.sample(t - REST) } else { 0.0 }
+                })
             })
             .map(|v| v.clamp(-limit, limit))
             .collect();
