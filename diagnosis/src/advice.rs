@@ -3,7 +3,7 @@
 use loopsight_core::model::Model;
 use serde::Serialize;
 
-use crate::conclusion::{Conclusion, Explanation};
+use crate::conclusion::{Conclusion, Explanation, Place};
 
 /// An experiment and what it is good for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -30,7 +30,12 @@ pub(crate) fn advice(
                     other.effect,
                     other.at.join(", ")
                 ),
-                experiment: separating(&best.place.effect, &other.effect),
+                experiment: format!(
+                    "{}; `loopsight experiment MODEL --separate {} {} -o plan.csv` makes it",
+                    separating(&best.place.effect, &other.effect),
+                    named(&best.place),
+                    named(other)
+                ),
             });
         }
     }
@@ -50,6 +55,11 @@ pub(crate) fn advice(
         });
     }
     list
+}
+
+/// An effect with its channels, as the command `experiment` reads it.
+fn named(place: &Place) -> String {
+    format!("{}@{}", place.effect, place.at.join("+"))
 }
 
 /// The experiment that separates two effects.

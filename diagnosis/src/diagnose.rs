@@ -59,6 +59,8 @@ pub(crate) const CLOSE: f64 = 1.01;
 const COMPLETE: f64 = 1.2;
 /// Least share of the standard deviation that an explanation must account for.
 pub(crate) const LEAST: f64 = 0.004;
+/// A standard error of so many times the value: the log says nothing of it.
+const UNDETERMINED: f64 = 10.0;
 /// Below this multiple of the floor a log explains itself.
 const BLIND: f64 = 1.3;
 /// Above this multiple of the floor something must be missing.
@@ -250,7 +252,11 @@ pub(crate) fn diagnose_above(
 /// Whether the log determines anything of the effect: what it cannot tell from the plant's own
 /// parameters is not found, however well a test recording speaks of it.
 fn determined(explanation: &Explanation) -> bool {
-    let says_nothing = |p: &Estimate| matches!(p.verdict, Verdict::Flat | Verdict::Dead);
+    let says_nothing = |p: &Estimate| match p.verdict {
+        Verdict::Flat | Verdict::Dead => true,
+        Verdict::NotPinned => p.std_error.is_none_or(|e| e > UNDETERMINED * p.value.abs()),
+        _ => false,
+    };
     !explanation.parameters.values().all(says_nothing)
 }
 

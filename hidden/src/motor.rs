@@ -128,12 +128,13 @@ mod tests {
     #[test]
     fn a_stalled_winding_follows_its_exponential() {
         let motor = Robot::Twil.parts().0;
+        let time_constant = motor.inductance / motor.resistance;
         let mut winding = Winding::new(motor, None, 1e-4);
         for k in 1..=50 {
             let (_, end) = winding.torque(9.0, 0.0);
             winding.advance(end);
             let t = 1e-4 * f64::from(k);
-            let exact = 9.0 / motor.resistance * (1.0 - (-t / 1e-3).exp());
+            let exact = 9.0 / motor.resistance * (1.0 - (-t / time_constant).exp());
             assert!((end - exact).abs() < 1e-12);
         }
     }

@@ -59,11 +59,11 @@ pub fn record(
     record_with(robot, effects, experiment, seed, ELECTRICAL_TIME_CONSTANT)
 }
 
-/// [`record`] with windings of another time constant `L/R`, s, than 1 ms.
+/// [`record`] with windings of another time constant `L/R`, s, than 0.1 ms.
 ///
-/// A millisecond is little, but it is there: on 25 s of data it leaves an error of a third of that
-/// of the counts, and an actuator lag of 1 ms is a true finding. With 0.1 ms, as of motors with
-/// ironless rotors, the clean machine is the lumped model for all that can be seen.
+/// At 0.1 ms, as of motors with ironless rotors, the clean machine is the lumped model for all that
+/// can be seen. A millisecond is little, but it is there: on 25 s of data it leaves an error of a
+/// third of that of the counts, and an actuator lag of 1 ms is a true finding.
 ///
 /// # Errors
 ///

@@ -87,7 +87,7 @@ const AXIS: Lumped = Lumped {
 };
 
 /// Time constant of the windings `L/R`, s, unless another is asked for.
-pub(crate) const ELECTRICAL_TIME_CONSTANT: f64 = 1e-3;
+pub(crate) const ELECTRICAL_TIME_CONSTANT: f64 = 1e-4;
 /// Torque constant and back-emf constant, N m/A and V s/rad: equal in SI units.
 const MOTOR_CONSTANT: f64 = 0.0265;
 /// Output over motor speed.
