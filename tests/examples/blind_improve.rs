@@ -61,7 +61,7 @@ fn improved(log: &Recording, unseen: &Recording) -> Option<(Improvement, f64, f6
     let runs = [log.run.clone()];
     let found = improve(&model, &runs, None, &[], &|_, _, _| {}).ok()?;
     let best = &found.best.as_ref()?.model;
-    let error = loopsight_diagnosis::compare(best, &[unseen.run.clone()], &[])
+    let error = loopsight_diagnosis::compare(best, std::slice::from_ref(&unseen.run), &[])
         .ok()?
         .nrmse;
     let floor = unseen.floor();

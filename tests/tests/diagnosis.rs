@@ -1,6 +1,11 @@
 //! What a diagnosis concludes: a few blind recordings, faulty logs, and logs that cannot tell.
 //! The whole blind table is `cargo run --release -p loopsight-tests --example blind_table`.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "helpers of tests: a failure is the test's failure"
+)]
+
 use loopsight_core::model::Model;
 use loopsight_core::run::Run;
 use loopsight_diagnosis::{Conclusion, Diagnosis, diagnose};
