@@ -30,7 +30,7 @@ fn judge(log: &Recording, test: Option<&Recording>) -> Diagnosis {
     let tests = test.map(|t| vec![t.run.clone()]);
     diagnose(
         &model(log),
-        &[log.run.clone()],
+        std::slice::from_ref(&log.run),
         tests.as_deref(),
         &[],
         &|_, _| {},
