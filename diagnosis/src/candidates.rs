@@ -23,11 +23,26 @@ impl Candidate {
         n - self.meta.parameters.len()..n
     }
 
-    /// How many of them a fit estimates.
+    /// How many of them are found from the log: estimated, or chosen from a list.
     pub(crate) fn complexity(&self) -> usize {
         self.own()
-            .filter(|i| self.model.parameters[*i].free)
+            .filter(|i| {
+                let parameter = &self.model.parameters[*i];
+                parameter.free || !parameter.declaration.starts.is_empty()
+            })
             .count()
+    }
+
+    /// The candidate with the values of `start` for those of its parameters that are not estimated.
+    pub(crate) fn chosen(&self, start: &[f64]) -> Self {
+        let mut chosen = self.clone();
+        for i in self.own() {
+            let parameter = &mut chosen.model.parameters[i];
+            if !parameter.free {
+                parameter.value = start.get(i).copied().or(parameter.value);
+            }
+        }
+        chosen
     }
 }
 

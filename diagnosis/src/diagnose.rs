@@ -141,7 +141,7 @@ pub(crate) fn diagnose_above(
         .par_iter()
         .enumerate()
         .filter_map(|(k, (i, start))| {
-            let promise = promise(&all[*i], start, &holdout, &nominal);
+            let promise = promise(&all[*i].chosen(start), start, &holdout, &nominal);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
             Some((promise?, k))
         })
@@ -159,7 +159,7 @@ pub(crate) fn diagnose_above(
         .par_iter()
         .filter_map(|(_, k)| {
             let (i, start) = &attempts[*k];
-            let found = look(&all[*i], start, &holdout, &nominal);
+            let found = look(&all[*i].chosen(start), start, &holdout, &nominal);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
             Some((*i, found?))
         })
@@ -253,7 +253,7 @@ pub(crate) fn diagnose_above(
 /// parameters is not found, however well a test recording speaks of it.
 fn determined(explanation: &Explanation) -> bool {
     let says_nothing = |p: &Estimate| match p.verdict {
-        Verdict::Flat | Verdict::Dead => true,
+        Verdict::Flat | Verdict::Dead | Verdict::Held => true,
         Verdict::NotPinned => p.std_error.is_none_or(|e| e > UNDETERMINED * p.value.abs()),
         _ => false,
     };
@@ -286,9 +286,9 @@ fn starts(candidate: &Candidate, nominal: &Solution, duration: f64) -> Vec<Vec<f
         let nearest = |value: f64| parameter.declaration.nearest(value);
         let neutral = parameter.value.unwrap_or(0.0);
         let listed = parameter.starts(duration);
-        let values: Vec<f64> = if !parameter.free {
+        let values: Vec<f64> = if !parameter.free && listed.is_empty() {
             vec![neutral]
-        } else if parameter.declaration.unit == "flow" && candidate.flow > 0.0 {
+        } else if parameter.free && parameter.declaration.unit == "flow" && candidate.flow > 0.0 {
             FLOW_STARTS
                 .iter()
                 .map(|s| nearest(s * candidate.flow))
@@ -402,7 +402,8 @@ fn explain(
                 let Some(estimate) = fit.parameters.get(&parameter.name) else {
                     continue;
                 };
-                if parameter.free {
+                // What was tried counts as found: a number of teeth is not fitted but chosen.
+                if parameter.free || !parameter.declaration.starts.is_empty() {
                     parameters.insert(parameter.declaration.id.to_owned(), estimate.clone());
                 }
             }
