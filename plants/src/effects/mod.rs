@@ -10,6 +10,7 @@ mod cubic_stiffness;
 mod dead_zone;
 mod directional_friction;
 mod encoder_ripple;
+mod first_order;
 mod gain_asymmetry;
 mod gravity_pendulum;
 mod gravity_slope;

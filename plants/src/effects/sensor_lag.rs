@@ -2,6 +2,8 @@
 
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
 
+use super::first_order;
+
 /// Sensor lag: the measurement follows the signal gradually.
 ///
 /// ```text
@@ -48,11 +50,11 @@ impl Effect<1, 1> for SensorLag {
     };
 
     fn contribution<S: Real>(at: &Reading<'_, S>, z: &[S; 1], p: &[S; 1]) -> S {
-        (z[0] - at.nominal) * p[0] / p[0].larger(S::of(SHORTEST))
+        first_order::contribution(at.nominal, z[0], p[0])
     }
 
     fn state_derivative<S: Real>(at: &Reading<'_, S>, z: &[S; 1], p: &[S; 1]) -> [S; 1] {
-        [(at.nominal - z[0]) / p[0].larger(S::of(SHORTEST))]
+        [first_order::rate(at.nominal, z[0], p[0])]
     }
 
     fn initial_state<S: Real>(at: &Reading<'_, S>, _p: &[S; 1]) -> [S; 1] {
@@ -62,35 +64,25 @@ impl Effect<1, 1> for SensorLag {
 
 declare_effect!(SensorLag, "sensor_lag", <1, 1>);
 
-/// Time constant below which a share of the lag stands for a shorter one, s.
-const SHORTEST: f64 = 0.004;
-
 #[cfg(test)]
 mod tests {
     use crate::effects::testing::*;
 
     use super::*;
 
-    /// What is left of a step of one, after `time`, and the area that was missing till then.
-    fn step(lag: f64, time: f64) -> (f64, f64) {
+    /// Settled at the start, and what is missing afterwards is the share not yet followed.
+    #[test]
+    fn starts_settled_and_follows() {
         let at = Reading {
-            nominal: 1.0,
+            nominal: 2.0,
             ..reading(&[])
         };
-        let (mut z, mut area, h) = ([0.0], 0.0, 1e-5);
-        let n = (time / h).round() as usize;
-        for _ in 0..n {
-            area -= h * SensorLag::contribution(&at, &z, &[lag]);
-            z[0] += h * SensorLag::state_derivative(&at, &z, &[lag])[0];
-        }
-        (-SensorLag::contribution(&at, &z, &[lag]), area)
-    }
-
-    #[test]
-    fn a_step_fades_with_the_time_constant() {
-        assert!((step(0.03, 0.03).0 - (-1.0f64).exp()).abs() < 1e-3);
-        for lag in [0.0, 0.001, 0.004, 0.03] {
-            assert!((step(lag, 0.5).1 - lag).abs() < 1e-4, "{lag}");
-        }
+        let z = SensorLag::initial_state(&at, &[0.03]);
+        assert_eq!(SensorLag::contribution(&at, &z, &[0.03]), 0.0);
+        assert_eq!(SensorLag::contribution(&at, &[0.5], &[0.03]), -1.5);
+        assert_eq!(
+            SensorLag::state_derivative(&at, &[0.5], &[0.03]),
+            [1.5 / 0.03]
+        );
     }
 }
