@@ -52,7 +52,6 @@ impl Effect<3, 0> for TorqueRipple {
                 .or(1.0)
                 .nonlinear()
                 .scaled(0.1)
-                .known()
                 .starting_at(&COUNTS),
         ],
         rarity: 2,
