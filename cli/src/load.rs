@@ -77,6 +77,26 @@ pub(crate) fn recording(model: &mut Model, path: &Path) -> Result<(Vec<Run>, Vec
     mapped(model, &log, path)
 }
 
+/// The runs of a test recording, which must measure what the log measures; its faults join those
+/// of the log.
+pub(crate) fn test_runs(
+    loaded: &mut Loaded,
+    path: Option<&Path>,
+) -> Result<Option<Vec<Run>>, Failure> {
+    let Some(path) = path else { return Ok(None) };
+    let mut model = loaded.model.clone();
+    let (runs, faults) = recording(&mut model, path)?;
+    if model.measured != loaded.model.measured {
+        return Err(Failure::request(format!(
+            "{} does not measure the same signals as {}",
+            path.display(),
+            loaded.log_path.display()
+        )));
+    }
+    loaded.faults.extend(faults);
+    Ok(Some(runs))
+}
+
 fn mapped(
     model: &mut Model,
     log: &loopsight_recordings::Source,
@@ -144,11 +164,8 @@ pub(crate) fn refuse_fatal(path: &Path, faults: &[Fault]) -> Result<(), Failure>
 
 /// Writes a text file through a temporary name in the same folder.
 pub(crate) fn save_text(path: &Path, text: &str) -> Result<(), Failure> {
-    let mut file = beside(path)?;
-    let wrong = |why: std::io::Error| cannot_write(path, &why.to_string());
-    std::io::Write::write_all(&mut file, text.as_bytes()).map_err(wrong)?;
-    make_readable(&file);
-    file.persist(path).map_err(|e| wrong(e.error))?;
+    writable(path)?;
+    loopsight_report::save(path, text)?;
     output::note(&format!("wrote {}", path.display()));
     Ok(())
 }
@@ -178,16 +195,3 @@ fn beside(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
 fn cannot_write(path: &Path, why: &str) -> Failure {
     Failure::request(format!("cannot write `{}`: {why}", path.display()))
 }
-
-/// Temporary files are private; a result is not.
-#[cfg(unix)]
-fn make_readable(file: &tempfile::NamedTempFile) {
-    use std::os::unix::fs::PermissionsExt as _;
-    // Worst case the file stays private: no reason to lose it.
-    let _ = file
-        .as_file()
-        .set_permissions(std::fs::Permissions::from_mode(0o644));
-}
-
-#[cfg(not(unix))]
-fn make_readable(_file: &tempfile::NamedTempFile) {}

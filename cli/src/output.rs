@@ -34,6 +34,16 @@ pub(crate) fn people(text: &str, json: bool) {
 
 /// A table with columns aligned: the first to the left, the others to the right.
 pub(crate) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
+    aligned(head, rows, 1)
+}
+
+/// A table with all columns aligned to the left.
+pub(crate) fn columns(head: &[&str], rows: &[Vec<String>]) -> String {
+    aligned(head, rows, head.len())
+}
+
+/// A table whose first `left` columns are aligned to the left, the others to the right.
+fn aligned(head: &[&str], rows: &[Vec<String>], left: usize) -> String {
     let mut widths: Vec<usize> = head.iter().map(|h| h.chars().count()).collect();
     for row in rows {
         for (width, cell) in widths.iter_mut().zip(row) {
@@ -44,7 +54,7 @@ pub(crate) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
         let mut text = String::new();
         for (i, (cell, width)) in cells.iter().zip(&widths).enumerate() {
             let gap = " ".repeat(width - cell.chars().count());
-            if i == 0 {
+            if i < left {
                 text.push_str(&format!("  {cell}{gap}"));
             } else {
                 text.push_str(&format!("  {gap}{cell}"));

@@ -7,7 +7,7 @@ use loopsight_report::{Context, diagnosis_page, save};
 
 use crate::arguments::DiagnoseOptions;
 use crate::failure::Failure;
-use crate::load::{Loaded, model_and_log, recording, writable};
+use crate::load::{Loaded, model_and_log, test_runs, writable};
 use crate::{output, progress};
 
 pub(crate) fn run(options: &DiagnoseOptions) -> Result<(), Failure> {
@@ -67,26 +67,6 @@ pub(crate) fn context(loaded: &Loaded, test: Option<&std::path::Path>, what: &st
             .collect(),
         command: output::command_line(),
     }
-}
-
-/// The runs of a test recording, which must measure what the log measures; its faults join those
-/// of the log.
-pub(crate) fn test_runs(
-    loaded: &mut Loaded,
-    path: Option<&std::path::Path>,
-) -> Result<Option<Vec<Run>>, Failure> {
-    let Some(path) = path else { return Ok(None) };
-    let mut model = loaded.model.clone();
-    let (runs, faults) = recording(&mut model, path)?;
-    if model.measured != loaded.model.measured {
-        return Err(Failure::request(format!(
-            "{} does not measure the same signals as {}",
-            path.display(),
-            loaded.log_path.display()
-        )));
-    }
-    loaded.faults.extend(faults);
-    Ok(Some(runs))
 }
 
 /// The conclusion in a sentence.

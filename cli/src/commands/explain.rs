@@ -7,7 +7,7 @@ use loopsight_core::{EffectMeta, Parameter, PlantMeta, Signal};
 
 use crate::arguments::ExplainOptions;
 use crate::failure::Failure;
-use crate::output;
+use crate::output::{self, columns};
 
 pub(crate) fn run(options: &ExplainOptions) -> Result<(), Failure> {
     let id = options.id.as_str();
@@ -61,30 +61,6 @@ fn parameters(title: &str, list: &[Parameter]) -> String {
         "\n{title}\n{}\n",
         columns(&["name", "unit", "default", "in a fit", "what"], &rows)
     )
-}
-
-/// As [`output::table`], all columns to the left.
-fn columns(head: &[&str], rows: &[Vec<String>]) -> String {
-    let mut widths: Vec<usize> = head.iter().map(|h| h.chars().count()).collect();
-    for row in rows {
-        for (width, cell) in widths.iter_mut().zip(row) {
-            *width = (*width).max(cell.chars().count());
-        }
-    }
-    let line = |cells: Vec<&str>| {
-        let padded: Vec<String> = cells
-            .iter()
-            .zip(&widths)
-            .map(|(c, w)| format!("{c}{}", " ".repeat(w - c.chars().count())))
-            .collect();
-        format!("  {}", padded.join("  ").trim_end())
-    };
-    let mut lines = vec![line(head.to_vec())];
-    lines.extend(
-        rows.iter()
-            .map(|r| line(r.iter().map(String::as_str).collect())),
-    );
-    lines.join("\n")
 }
 
 fn signals(title: &str, list: &[Signal]) -> String {

@@ -7,32 +7,16 @@ use loopsight_report::{Context, fit_page, save};
 
 use crate::arguments::{FitOptions, MethodName, SchemeName};
 use crate::failure::Failure;
-use crate::load::{Loaded, model_and_log, recording, refuse_fatal, save_text, writable};
+use crate::load::{Loaded, model_and_log, refuse_fatal, save_text, test_runs, writable};
 use crate::{output, progress};
 
 pub(crate) fn run(options: &FitOptions) -> Result<(), Failure> {
     for path in options.output.iter().chain(&options.html) {
         writable(path)?;
     }
-    let loaded = model_and_log(&options.files)?;
+    let mut loaded = model_and_log(&options.files)?;
     refuse_fatal(&loaded.log_path, &loaded.faults)?;
-    let mut faults = loaded.faults.clone();
-    let test = match &options.test {
-        None => None,
-        Some(path) => {
-            let mut model = loaded.model.clone();
-            let (runs, test_faults) = recording(&mut model, path)?;
-            if model.measured != loaded.model.measured {
-                return Err(Failure::request(format!(
-                    "{} does not measure the same signals as {}",
-                    path.display(),
-                    loaded.log_path.display()
-                )));
-            }
-            faults.extend(test_faults);
-            Some(runs)
-        }
-    };
+    let test = test_runs(&mut loaded, options.test.as_deref())?;
     let settings = FitSettings {
         method: match options.method {
             MethodName::Rls => Method::Rls,
@@ -49,7 +33,7 @@ pub(crate) fn run(options: &FitOptions) -> Result<(), Failure> {
         &loaded.model,
         &loaded.runs,
         test.as_deref(),
-        &faults,
+        &loaded.faults,
         &settings,
         &|i, e| {
             bar.set_message(match settings.method {

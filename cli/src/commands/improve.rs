@@ -5,9 +5,9 @@ use loopsight_diagnosis::{Fit, Improvement, improve};
 use loopsight_report::{improvement_page, save};
 
 use crate::arguments::ImproveOptions;
-use crate::commands::diagnose::{context, pictures, sentence, test_runs};
+use crate::commands::diagnose::{context, pictures, sentence};
 use crate::failure::Failure;
-use crate::load::{model_and_log, save_text, writable};
+use crate::load::{model_and_log, save_text, test_runs, writable};
 use crate::{output, progress};
 
 pub(crate) fn run(options: &ImproveOptions) -> Result<(), Failure> {
