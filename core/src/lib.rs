@@ -40,6 +40,8 @@ mod configured;
 #[cfg(feature = "std")]
 pub mod excitation;
 #[cfg(feature = "std")]
+pub mod expression;
+#[cfg(feature = "std")]
 pub mod identification;
 #[cfg(feature = "std")]
 pub mod loop_file;
