@@ -349,3 +349,54 @@ fn effects_on_encoders_reach_the_speeds_behind_them() {
         );
     }
 }
+
+/// What is pushed from outside acts as the effect that adds as much at the same place.
+#[test]
+fn a_push_is_a_constant_effect() {
+    let text = format!(
+        "{DDMR}[[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\"]\nlevel = 0.5\nwidth = 1.0\n\
+         [log.measured]\nlinear_velocity = {{ column = \"v_m_per_s\" }}\n\
+         angular_velocity = {{ column = \"w_rad_per_s\" }}\n"
+    );
+    for (with_friction, text) in [(true, text.as_str()), (false, &text.replace("0.5", "0.0"))] {
+        let base = model(text);
+        for (id, channel, level) in [
+            ("constant_force", "wheel.left", 0.7),
+            ("constant_force", "body.yaw", -2.0),
+            ("input_offset", "input.right", 1.1),
+        ] {
+            let mut with = base.with_effect(id, &[channel]).unwrap();
+            with.parameters.last_mut().unwrap().value = Some(level);
+            let expected = simulate(&with, &with.values());
+            let place = base.plant.channels.iter().find(|c| c.id == channel);
+            let values = base.values();
+            let mut simulator = Simulator::new(&base, &values);
+            simulator.push(place.unwrap().place, level);
+            let mut pushed = Vec::new();
+            let x0 = vec![0.0; base.n_states()];
+            free_run(&mut simulator, &x0, &run(&base), |_, y| {
+                pushed.push(y.to_vec())
+            });
+            let off = difference(&pushed, &expected);
+            assert!(off < 1e-12, "{channel}, friction {with_friction}: {off}");
+        }
+    }
+}
+
+/// A push on the rate of a state is an acceleration.
+#[test]
+fn a_pushed_rate_is_a_slope() {
+    let base = model(
+        "[plant.dc_axis]\nK_A = 0.0\nK_C = 3.0\n[log.measured]\nspeed = { column = \"w_rad_per_s\" }\n",
+    );
+    let values = base.values();
+    let mut simulator = Simulator::new(&base, &values);
+    simulator.push(Place::Rate(0), 2.0);
+    simulator.push(Place::Output(0), 9.0);
+    simulator.reset(&[0.0, 0.0], &[0.0]);
+    simulator.advance(1.5, &[0.0]);
+    assert!((simulator.state()[0] - 3.0).abs() < 1e-12);
+    simulator.push(Place::Rate(0), 0.0);
+    simulator.advance(2.0, &[0.0]);
+    assert!((simulator.state()[0] - 3.0).abs() < 1e-12);
+}

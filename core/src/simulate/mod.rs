@@ -2,6 +2,7 @@
 
 mod bound;
 mod history;
+mod push;
 mod sensing;
 
 use std::borrow::Cow;
@@ -13,6 +14,7 @@ use crate::{NoPast, Place, Rk4, substeps};
 
 use bound::{Bounds, Scene};
 use history::{Between, History};
+use push::Pushed;
 use sensing::{Integral, Sensing, sense};
 
 /// Integrates a model through time.
@@ -34,6 +36,7 @@ pub struct Simulator<'m, S> {
     rk4: Rk4<Vec<S>>,
     x: Vec<S>,
     scratch: Scratch<S>,
+    pushed: Pushed<S>,
     /// Integrals behind means at the start of the last interval, one per sensor.
     before: Vec<S>,
     /// What output effects added to angles then, one per output effect.
@@ -115,6 +118,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                 w: vec![S::zero(); model.n_efforts()],
                 signals: vec![S::zero(); model.n_signals()],
             },
+            pushed: Pushed::nothing(&model),
             before: vec![S::zero(); sensors.len()],
             added_before: vec![S::zero(); bounds.outputs.len()],
             needed,
@@ -312,6 +316,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             rk4,
             x,
             scratch,
+            pushed,
             needed,
             ..
         } = self;
@@ -332,10 +337,14 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             let nominal = scratch.held[i];
             scratch.held[i] += scene.contribution(bound, nominal, &histories[history]);
         }
+        for (held, push) in scratch.held.iter_mut().zip(&pushed.inputs) {
+            *held += *push;
+        }
+        scratch.w.copy_from_slice(&pushed.efforts);
         let (nx, nu) = (model.n_states(), model.plant.inputs.len());
         let dynamics = S::dynamics(model.dynamics);
-        if bounds.idle() && x.len() == nx {
-            // Nothing acts on the plant within the step (`w` stays zero): half the time.
+        if bounds.idle() && x.len() == nx && pushed.rates.is_empty() {
+            // Nothing changes what acts on the plant within the step: half the time.
             dynamics.step(x, S::of(h), &scratch.held, &scratch.w, p);
             return;
         }
@@ -386,7 +395,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                 interval,
             };
             if !bounds.efforts.is_empty() {
-                w.fill(S::zero());
+                w.copy_from_slice(&pushed.efforts);
                 for bound in &bounds.efforts {
                     let Place::Effort(i) = bound.place else {
                         continue;
@@ -397,6 +406,9 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                 }
             }
             dynamics.derivative(plant_x, u, w, p, &mut dx[..nx]);
+            for (rate, push) in dx.iter_mut().zip(&pushed.rates) {
+                *rate += *push;
+            }
             for bound in &bounds.bodies {
                 let Place::Rate(i) = bound.place else {
                     continue;
