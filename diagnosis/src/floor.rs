@@ -14,36 +14,46 @@ use crate::score::Tally;
 /// noise of variance `σ²` has the variance `20 σ²`; the median keeps jumps of the motion out.
 pub(crate) fn floor(model: &Model, runs: &[Run]) -> f64 {
     let n = model.measured.len();
-    let mut sum = 0.0;
-    for (signal, measured) in model.measured.iter().enumerate() {
-        let mut tally = Tally::default();
-        let mut thirds = Vec::new();
-        let mut period = f64::NAN;
-        for run in runs {
-            let y = |k: usize| run.sample(k)[signal];
-            for k in 0..run.len() {
-                tally.add(y(k), y(k));
-                if k >= 3 {
-                    let d = y(k) - 3.0 * y(k - 1) + 3.0 * y(k - 2) - y(k - 3);
-                    if d.is_finite() {
-                        thirds.push(d.abs());
-                    }
+    let sum: f64 = model
+        .measured
+        .iter()
+        .enumerate()
+        .map(|(signal, measured)| {
+            let (noise, std) = noise(&measured.sensor, signal, runs);
+            let relative = noise / std;
+            if relative.is_finite() {
+                relative * relative
+            } else {
+                0.0
+            }
+        })
+        .sum();
+    (sum / n.max(1) as f64).sqrt()
+}
+
+/// Standard deviations of the noise of the `signal`-th measured signal, and of the signal itself.
+pub(crate) fn noise(sensor: &Sensor, signal: usize, runs: &[Run]) -> (f64, f64) {
+    let mut tally = Tally::default();
+    let mut thirds = Vec::new();
+    let mut period = f64::NAN;
+    for run in runs {
+        let y = |k: usize| run.sample(k)[signal];
+        for k in 0..run.len() {
+            tally.add(y(k), y(k));
+            if k >= 3 {
+                let d = y(k) - 3.0 * y(k - 1) + 3.0 * y(k - 2) - y(k - 3);
+                if d.is_finite() {
+                    thirds.push(d.abs());
                 }
             }
-            period = period.min(run.median_period());
         }
-        let noise = match &measured.sensor {
-            Sensor::EncoderCounts(encoder) => encoder.noise(period),
-            Sensor::Instantaneous | Sensor::IntervalMean => median(thirds) / 0.6745 / 20f64.sqrt(),
-        };
-        let relative = noise / tally.std();
-        sum += if relative.is_finite() {
-            relative * relative
-        } else {
-            0.0
-        };
+        period = period.min(run.median_period());
     }
-    (sum / n.max(1) as f64).sqrt()
+    let noise = match sensor {
+        Sensor::EncoderCounts(encoder) => encoder.noise(period),
+        Sensor::Instantaneous | Sensor::IntervalMean => median(thirds) / 0.6745 / 20f64.sqrt(),
+    };
+    (noise, tally.std())
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
