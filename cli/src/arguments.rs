@@ -20,6 +20,8 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Begin: a folder for a robot, or a crate with a plant and an effect of your own.
+    New(NewOptions),
     /// Check model, loop and experiment files, and logs, without doing anything with them.
     Check(CheckOptions),
     /// List the known plants, effects, estimators, controllers and drivers.
@@ -47,6 +49,23 @@ pub(crate) enum Command {
         /// The shell.
         shell: clap_complete::Shell,
     },
+}
+
+#[derive(Debug, Args)]
+#[command(group(clap::ArgGroup::new("kind").required(true).args(["plant", "rust"])))]
+pub(crate) struct NewOptions {
+    /// The folder to make; it must not exist yet.
+    pub(crate) folder: PathBuf,
+    /// Files for a robot of this plant: model, experiment, loop; `loopsight list plants` shows them.
+    #[arg(long, value_name = "PLANT")]
+    pub(crate) plant: Option<String>,
+    /// A Rust crate with a plant and an effect of its own, and the whole command around them.
+    #[arg(long)]
+    pub(crate) rust: bool,
+    /// The checkout of loopsight that the crate is built with; by default the one that this command
+    /// was built from.
+    #[arg(long, value_name = "PATH", conflicts_with = "plant")]
+    pub(crate) loopsight: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

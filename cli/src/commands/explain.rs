@@ -64,6 +64,9 @@ fn parameters(title: &str, list: &[Parameter]) -> String {
 }
 
 fn signals(title: &str, list: &[Signal]) -> String {
+    if list.is_empty() {
+        return String::new();
+    }
     let rows: Vec<Vec<String>> = list
         .iter()
         .map(|s| {

@@ -10,5 +10,6 @@ pub(crate) mod explain;
 pub(crate) mod fit;
 pub(crate) mod improve;
 pub(crate) mod list;
+pub(crate) mod new;
 pub(crate) mod run;
 pub(crate) mod simulate;

@@ -1,0 +1,16 @@
+//! `loopsight new`: a starting point that runs at once.
+
+mod folder;
+mod pace;
+mod robot;
+mod workshop;
+
+use crate::arguments::NewOptions;
+use crate::failure::Failure;
+
+pub(crate) fn run(options: &NewOptions) -> Result<(), Failure> {
+    match &options.plant {
+        Some(plant) => robot::write(&options.folder, plant),
+        None => workshop::write(&options.folder, options.loopsight.as_deref()),
+    }
+}
