@@ -5,6 +5,8 @@
     reason = "a command that breaks its word is how this program fails"
 )]
 
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::TcpListener;
 use std::path::Path;
 use std::process::Command;
 
@@ -115,4 +117,80 @@ fn the_model_is_wrong_the_effect_is_named_and_the_error_falls() {
     let after = json(&["compare", &better, "zigzag.csv", "--json"]);
     let after = after["nrmse"].as_f64().unwrap();
     assert!(after < 0.012, "{before} before, {after} after");
+}
+
+#[test]
+fn the_helmsman_holds_the_rate_and_the_estimator_sees_the_damping() {
+    for (role, id) in [
+        ("controllers", "three_position"),
+        ("estimators", "random_walk"),
+        ("drivers", "tcp_lines"),
+    ] {
+        assert!(done(&["list", role]).contains(id), "{id}");
+        assert!(done(&["explain", id]).contains("Settings"), "{id}");
+    }
+    // No robot needs to listen for its loop to be checked.
+    done(&["check", "helm.toml", "learn.toml", "pond.toml"]);
+    let run = json(&["run", "helm.toml", "--json"]);
+    let error = run["tracking"][0]["rms_error"].as_f64().unwrap();
+    assert!(error < 0.04, "{run}");
+    let run = json(&["run", "learn.toml", "--json"]);
+    // Of the linear damping alone 0.5 1/s would be found; the cube adds 3 · 4 · 0.15² at most.
+    let damping = run["parameters"]["damping"].as_f64().unwrap();
+    assert!((0.5..0.77).contains(&damping), "{run}");
+}
+
+/// A ship behind a TCP connection, on its own clock: 20 ms between two readings.
+fn pond() -> std::net::SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    std::thread::spawn(move || {
+        let (stream, _) = listener.accept().unwrap();
+        let mut lines = BufReader::new(stream);
+        let (mut rate, mut heading, mut rudder) = (0.0, 0.0, 0.0);
+        let mut asked = String::new();
+        while lines.read_line(&mut asked).is_ok_and(|n| n > 0) {
+            let answer = match asked.trim().split_once(' ') {
+                Some(("write", angle)) => {
+                    rudder = angle.parse::<f64>().unwrap().clamp(-0.4, 0.4);
+                    format!("{rudder}\n")
+                }
+                _ => {
+                    heading += 0.02 * rate;
+                    rate += 0.02 * (0.25 * rudder - 0.5 * rate - 4.0 * rate * rate * rate);
+                    format!("{rate} {heading}\n")
+                }
+            };
+            lines.get_mut().write_all(answer.as_bytes()).unwrap();
+            asked.clear();
+        }
+    });
+    address
+}
+
+#[test]
+fn a_loop_drives_a_ship_over_tcp() {
+    let desk = tempfile::tempdir().unwrap();
+    let path = |name: &str| desk.path().join(name);
+    std::fs::write(path("helm_model.toml"), here("helm_model.toml")).unwrap();
+    let text = here("pond.toml")
+        .replace("127.0.0.1:5555", &pond().to_string())
+        .replace("period_s = 0.1", "period_s = 0.02")
+        .replace("duration_s = 10.0", "duration_s = 4.0");
+    std::fs::write(path("pond.toml"), text).unwrap();
+    let log = path("log.csv");
+    let log = log.to_str().unwrap();
+    done(&["run", path("pond.toml").to_str().unwrap(), "-o", log]);
+    let text = std::fs::read_to_string(log).unwrap();
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').map(|v| v.parse().unwrap()).collect())
+        .collect();
+    assert_eq!(rows.len(), 200);
+    // The log holds what the ship applied: its rudder ends at 0.4 rad, 0.5 rad were asked for.
+    assert_eq!(rows[0][1], 0.4);
+    let late = &rows[150..];
+    let mean = late.iter().map(|r| r[2]).sum::<f64>() / late.len() as f64;
+    assert!((mean - 0.1).abs() < 0.005, "{mean} rad/s");
 }
