@@ -51,7 +51,7 @@ pub(super) fn write(target: &Path, plant: &str) -> Result<(), Failure> {
     output::result(&format!(
         "next:\n  cd {}\n  {}",
         target.display(),
-        COMMANDS.join("\n  ")
+        commands().join("\n  ")
     ));
     Ok(())
 }
@@ -124,10 +124,11 @@ fn model_text(
     pace: Pace,
 ) -> String {
     let mut text = format!(
-        "# {}, a `{}`: {}.\n# `loopsight explain {}` tells more: signals, channels, effects that fit.\nname = {}\n\n",
+        "# {}, a `{}`: {}.\n# `{} explain {}` tells more: signals, channels, effects that fit.\nname = {}\n\n",
         name,
         meta.id,
         meta.summary,
+        program(),
         meta.id,
         quoted(name)
     );
@@ -369,12 +370,22 @@ fn loop_text(name: &str, meta: &PlantMeta, deviations: &[f64], pace: Pace, learn
     text
 }
 
+/// The name of this program: that of a crate with parts of its own is not `loopsight`.
+fn program() -> String {
+    let path = std::env::args_os().next().map(std::path::PathBuf::from);
+    let name = path.and_then(|p| Some(p.file_stem()?.to_string_lossy().into_owned()));
+    name.unwrap_or_else(|| "loopsight".to_owned())
+}
+
 /// What to type next.
-const COMMANDS: [&str; 3] = [
-    "loopsight check model.toml experiment.toml",
-    "loopsight simulate model.toml experiment.toml -o log.csv",
-    "loopsight fit model.toml log.csv -o fitted.toml --html fit.html",
-];
+fn commands() -> [String; 3] {
+    [
+        "check model.toml experiment.toml",
+        "simulate model.toml experiment.toml -o log.csv",
+        "fit model.toml log.csv -o fitted.toml --html fit.html",
+    ]
+    .map(|rest| format!("{} {rest}", program()))
+}
 
 fn readme_text(name: &str, meta: &PlantMeta, looped: bool) -> String {
     let mut text = format!(
@@ -390,16 +401,18 @@ fn readme_text(name: &str, meta: &PlantMeta, looped: bool) -> String {
         "\nThe next three commands, in this folder:\n\n```sh\n{}\n```\n\n\
          They look the files over, make the log of a simulated robot, and fit the model to it;\n\
          `fit.html` opens in any browser.\n\nThen take a log of your own robot in the place of `log.csv`:\n\n```sh\n\
-         loopsight compare model.toml log.csv --html compare.html\n\
-         loopsight diagnose model.toml log.csv --html why.html\n\
-         loopsight improve model.toml log.csv -o better.toml\n",
-        COMMANDS.join("\n")
+         {program} compare model.toml log.csv --html compare.html\n\
+         {program} diagnose model.toml log.csv --html why.html\n\
+         {program} improve model.toml log.csv -o better.toml\n",
+        commands().join("\n"),
+        program = program()
     ));
     if looped {
-        text.push_str("loopsight run loop.toml --html run.html\n");
+        text.push_str(&format!("{} run loop.toml --html run.html\n", program()));
     }
     text.push_str(&format!(
-        "```\n\n`loopsight explain {}` tells what the robot is made of and which effects fit where.\n",
+        "```\n\n`{} explain {}` tells what the robot is made of and which effects fit where.\n",
+        program(),
         meta.id
     ));
     text
