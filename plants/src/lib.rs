@@ -5,9 +5,11 @@
 
 #![cfg_attr(not(feature = "std"), no_std)]
 
+mod cart_pole;
 mod dc_axis;
 mod ddmr;
 pub mod effects;
 
+pub use cart_pole::CartPole;
 pub use dc_axis::DcAxis;
 pub use ddmr::Ddmr;
