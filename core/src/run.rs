@@ -1,10 +1,12 @@
 //! Measurements, mapped on the signals of a model.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use crate::sensor::Sensor;
+use crate::simulate::StateObserver;
 
 /// One uninterrupted run: what was applied and what was measured, in SI units.
 ///
@@ -24,6 +26,8 @@ pub struct Run {
     pub n_inputs: usize,
     /// Number of measured signals.
     pub n_measured: usize,
+    /// Holds free runs of a model to what was measured, where that model needs it.
+    pub observer: Option<Arc<StateObserver>>,
 }
 
 impl Run {
@@ -65,6 +69,10 @@ impl Run {
                 .to_vec(),
             n_inputs: self.n_inputs,
             n_measured: self.n_measured,
+            observer: self
+                .observer
+                .as_ref()
+                .map(|observer| Arc::new(observer.part(range))),
         }
     }
 

@@ -7,6 +7,7 @@ use loopsight_recordings::Fault;
 use nalgebra::DVector;
 use serde::Serialize;
 
+use crate::observer::{Held, hold};
 use crate::prediction::{InitialStates, one_step};
 use crate::score::{SignalScore, Tally, overall};
 
@@ -21,6 +22,10 @@ pub struct Comparison {
     pub signals: Vec<SignalScore>,
     /// Faults of the log.
     pub faults: Vec<Fault>,
+    /// How the free run was held to the measurements; absent where it is simulated from the inputs
+    /// alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held: Option<Held>,
     /// Everything a picture needs.
     #[serde(skip)]
     pub runs: Vec<RunTrace>,
@@ -34,6 +39,7 @@ impl Comparison {
             fit_percent: f64::NAN,
             signals: Vec::new(),
             faults: Vec::new(),
+            held: None,
             runs: Vec::new(),
         }
     }
@@ -63,7 +69,7 @@ pub struct SignalTrace {
     pub unit: String,
     /// What was measured (NaN: missing).
     pub measured: Vec<f64>,
-    /// The model simulated from the inputs alone.
+    /// The model simulated from the inputs alone, or [held](Comparison::held) to the measurements.
     pub free_run: Vec<f64>,
     /// The model's prediction from the previous sample.
     pub one_step: Vec<f64>,
@@ -83,7 +89,8 @@ pub enum CompareError {
     NoSamples,
     /// The simulation left the finite numbers.
     #[error(
-        "the free run of `{run}` diverges after {time:.3} s: the model is unstable with these parameters"
+        "the free run{} diverges after {time:.3} s: the model is unstable with these parameters",
+        of_run(run)
     )]
     Diverged {
         /// The run.
@@ -93,8 +100,20 @@ pub enum CompareError {
     },
 }
 
+/// ` of <run>` where the run has a name.
+fn of_run(name: &str) -> String {
+    if name.is_empty() {
+        String::new()
+    } else {
+        format!(" of `{name}`")
+    }
+}
+
 /// Simulates `model` over `runs` from the inputs alone, from initial states that are estimated for
 /// each run, and predicts each sample from the one before.
+///
+/// A model that is unstable or integrates cannot be simulated like that: it is held to the
+/// measurements by an observer, as slow as it may be, and [`Comparison::held`] says so.
 pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparison, CompareError> {
     let missing = model.missing_values();
     if !missing.is_empty() {
@@ -109,7 +128,8 @@ pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparis
         return Err(CompareError::NoSamples);
     }
     let values = model.values();
-    let initial = InitialStates::estimate(model, &values, runs);
+    let runs = hold(model, &values, runs);
+    let initial = InitialStates::estimate(model, &values, &runs);
     let mut tallies = vec![Tally::default(); model.measured.len()];
     let mut traces = Vec::with_capacity(runs.len());
     for (run, x0) in runs.iter().zip(&initial.states) {
@@ -126,6 +146,7 @@ pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparis
         fit_percent: 100.0 * (1.0 - nrmse),
         signals,
         faults: faults.to_vec(),
+        held: Held::of(&runs),
         runs: traces,
     })
 }

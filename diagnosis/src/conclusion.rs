@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::advice::Advice;
 use crate::fit::Estimate;
+use crate::observer::Held;
 use crate::where_it_fails::Statement;
 
 /// An error, as the contract has it.
@@ -86,6 +87,10 @@ pub struct Diagnosis {
     pub faults: Vec<Fault>,
     /// Experiments that would tell more.
     pub advice: Vec<Advice>,
+    /// How free runs were held to the measurements; absent where they are simulated from the inputs
+    /// alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held: Option<Held>,
     /// The nominal model, fitted.
     #[serde(skip)]
     pub model: Option<Model>,

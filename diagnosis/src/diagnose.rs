@@ -16,6 +16,8 @@ use crate::fit::{Estimate, Fit, FitError, FitSettings, Verdict};
 use crate::floor::floor;
 use crate::holdout::Holdout;
 use crate::judge::{Losses, advantage, nrmse, significance};
+use crate::observer::{Held, hold_alike};
+use crate::output_error::prepare;
 use crate::prediction::signal_rms;
 use crate::problem::{Effort, Problem, Solution};
 use crate::sufficiency;
@@ -108,6 +110,10 @@ pub(crate) fn diagnose_above(
     if !reasons.is_empty() {
         return Ok(refused(Conclusion::DataInsufficient, faults, reasons));
     }
+    let prepared = prepare(model, runs, &FitSettings::default())?;
+    let (model, runs) = (&*prepared.model, &*prepared.runs);
+    let test = test.map(|test| hold_alike(model, test, runs));
+    let test = test.as_deref();
     let holdout = Holdout::new(model, runs, test);
     let seen = holdout.seen.as_deref();
     let quiet = |_: u64, _: f64| {};
@@ -244,6 +250,7 @@ pub(crate) fn diagnose_above(
         where_it_fails: statements,
         faults: faults.to_vec(),
         advice,
+        held: Held::of(runs),
         model: Some(fitted_nominal),
         nominal_fit,
     })
@@ -270,6 +277,7 @@ fn refused(verdict: Conclusion, faults: &[Fault], advice: Vec<Advice>) -> Diagno
         where_it_fails: Vec::new(),
         faults: faults.to_vec(),
         advice,
+        held: None,
         model: None,
         nominal_fit: f64::NAN,
     }

@@ -1,5 +1,6 @@
 //! Least squares on the error of the free run.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use loopsight_core::model::Model;
@@ -11,7 +12,10 @@ use crate::compare::Comparison;
 use crate::fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
 use crate::flatness::Flatness;
 use crate::noise;
+use crate::observer::{growth, hold_with};
+use crate::prediction::InitialStates;
 use crate::problem::{Effort, Problem};
+use crate::regression::batch;
 
 /// Fits the free parameters and the initial states of all runs.
 ///
@@ -41,7 +45,8 @@ pub(crate) fn fit(
         iterations: settings.max_iterations,
         ..Effort::FULL
     };
-    let mut problem = Problem::new(model, runs, progress)?;
+    let prepared = prepare(model, runs, settings)?;
+    let mut problem = Problem::new(&prepared.model, &prepared.runs, progress)?;
     let start = problem.start(settings)?;
     let start = problem.balance(start);
     let mut solution = problem.solve(&start, effort)?;
@@ -50,6 +55,67 @@ pub(crate) fn fit(
         solution = problem.solve(&start, effort)?;
     }
     Ok(problem.result(&solution))
+}
+
+/// A model and recordings that a fit can begin with.
+pub(crate) struct Prepared<'a> {
+    pub(crate) model: Cow<'a, Model>,
+    pub(crate) runs: Cow<'a, [Run]>,
+}
+
+/// Horizons of the rounds in which an observer is made to suit the parameters, as shares of the last
+/// one: from wrong parameters a long free run leads nowhere.
+const ROUNDS: [f64; 4] = [0.25, 0.5, 1.0, 1.0];
+/// Effort of one of them.
+const ROUND: Effort = Effort {
+    iterations: 16,
+    tolerance: 1e-6,
+};
+
+/// `model` and `runs` as they are where the model can be simulated from the inputs alone. Where it
+/// cannot, the runs are held to the measurements, and the model has the values that the observer was
+/// made for, fitted: one that suits the model makes its errors white, and only those leave the
+/// parameters unbiased where the inputs come from a loop that feeds the measurements back (L. Ljung,
+/// 1999, "System Identification", 2nd edition, section 13.4).
+pub(crate) fn prepare<'a>(
+    model: &'a Model,
+    runs: &'a [Run],
+    settings: &FitSettings,
+) -> Result<Prepared<'a>, FitError> {
+    let mut prepared = Prepared {
+        model: Cow::Borrowed(model),
+        runs: Cow::Borrowed(runs),
+    };
+    let Some(mut values) = first_values(model, runs, settings) else {
+        return Ok(prepared);
+    };
+    let Some(mut growth) = growth(model, &values, runs) else {
+        return Ok(prepared);
+    };
+    let mut present = model.clone();
+    for share in ROUNDS {
+        let mut shortened = growth.clone();
+        shortened.horizon *= share;
+        prepared.runs = hold_with(model, &values, runs, &shortened);
+        present.set_values(&values);
+        let mut problem = Problem::new(&present, &prepared.runs, &|_, _| {})?;
+        let states = InitialStates::guess(&present, &values, &prepared.runs).states;
+        values = problem.solve_from(&values, &states, ROUND)?.values;
+        // Once held, always held: what needs no observer with it may need one without.
+        growth = self::growth(model, &values, runs).unwrap_or(growth);
+    }
+    prepared.runs = hold_with(model, &values, runs, &growth);
+    present.set_values(&values);
+    prepared.model = Cow::Owned(present);
+    Ok(prepared)
+}
+
+/// The file's values, or those of a regression where it gives none.
+fn first_values(model: &Model, runs: &[Run], settings: &FitSettings) -> Option<Vec<f64>> {
+    if model.missing_values().is_empty() {
+        return Some(model.values());
+    }
+    batch(model, runs, settings.scheme, 0.0).ok()
 }
 
 impl Problem<'_> {

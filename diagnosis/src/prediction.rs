@@ -2,17 +2,27 @@
 
 use loopsight_core::model::{Model, pseudo_inverse};
 use loopsight_core::run::Run;
-use loopsight_core::simulate::{Simulator, free_run};
+use loopsight_core::simulate::{Simulator, follow, free_run};
 use loopsight_core::{DUAL_WIDTH, Dual, Real, derivative, variable};
 use nalgebra::{DMatrix, DVector};
 
 /// Plant states of which a measured signal is a direct function: those an initial state can be
 /// estimated for from the first samples. The others start at zero.
-pub(crate) fn visible_states(model: &Model, values: &[f64]) -> Vec<usize> {
+fn visible_states(model: &Model, values: &[f64]) -> Vec<usize> {
     let (jacobian, _) = model.measurement_jacobian(values, &vec![0.0; model.n_states()]);
     (0..model.n_states())
         .filter(|i| jacobian.column(*i).iter().any(|v| *v != 0.0))
         .collect()
+}
+
+/// Plant states whose initial values are estimated: the visible ones, and where the runs are held to
+/// the measurements all that those say something about.
+pub(crate) fn estimated_states(model: &Model, values: &[f64], runs: &[Run]) -> Vec<usize> {
+    let observer = runs.iter().find_map(|run| run.observer.as_deref());
+    observer.map_or_else(
+        || visible_states(model, values),
+        |observer| observer.observed.clone(),
+    )
 }
 
 /// The free run over `run` and its derivatives by some parameters and initial states.
@@ -99,17 +109,12 @@ pub(crate) fn signal_rms(
     let mut n = 0.0f64;
     let mut simulator = Simulator::new(model, values);
     for (run, x0) in runs.iter().zip(states) {
-        for k in 0..run.len() {
-            if k == 0 {
-                simulator.reset(x0.as_slice(), run.input(0));
-            } else {
-                simulator.advance(run.time[k], run.input(k - 1));
-            }
-            for (sum, value) in squares.iter_mut().zip(simulator.signals()) {
+        follow(&mut simulator, x0.as_slice(), run, |_, _, now| {
+            for (sum, value) in squares.iter_mut().zip(now.signals()) {
                 *sum += value * value;
             }
             n += 1.0;
-        }
+        });
     }
     squares.iter().map(|s| (s / n.max(1.0)).sqrt()).collect()
 }
@@ -141,7 +146,7 @@ impl InitialStates {
     /// rounding where the plant is linear, and a step is taken only if it lowers the error.
     pub(crate) fn estimate(model: &Model, values: &[f64], runs: &[Run]) -> Self {
         let mut initial = Self::guess(model, values, runs);
-        let visible = visible_states(model, values);
+        let visible = estimated_states(model, values, runs);
         for (run, x0) in runs.iter().zip(&mut initial.states) {
             if run.len() < 2 {
                 continue;
@@ -216,12 +221,13 @@ pub(crate) fn one_step(
     };
     let mut free = Simulator::new(model, values);
     let mut outputs = vec![0.0; model.measured.len()];
+    let mut before = outputs.clone();
     let mut innovation = DVector::zeros(model.measured.len());
     free.reset(x0, run.input(0));
     let mut next = free.clone();
     for k in 1..run.len() {
-        free.measure(&mut outputs);
-        for (i, (y, p)) in run.sample(k - 1).iter().zip(&outputs).enumerate() {
+        free.measure(&mut before);
+        for (i, (y, p)) in run.sample(k - 1).iter().zip(&before).enumerate() {
             innovation[i] = if y.is_finite() { y - p } else { 0.0 };
         }
         next.clone_from(&free);
@@ -232,6 +238,9 @@ pub(crate) fn one_step(
         next.advance(run.time[k], run.input(k - 1));
         next.measure(&mut outputs);
         each(k, &outputs);
+        if let Some(observer) = run.observer.as_deref() {
+            free.correct(observer, k - 1, run.sample(k - 1), &before);
+        }
         free.advance(run.time[k], run.input(k - 1));
     }
 }

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::fit::{FitError, FitSettings};
 use crate::flatness::{DEAD, Named};
 use crate::noise::Block;
-use crate::prediction::{InitialStates, predict, residuals, sensitivities, visible_states};
+use crate::prediction::{InitialStates, estimated_states, predict, residuals, sensitivities};
 use crate::regression::batch;
 use crate::score::Tally;
 
@@ -121,7 +121,7 @@ impl<'a> Problem<'a> {
             .collect();
         let visible = match held {
             Some(_) => Vec::new(),
-            None => visible_states(model, &nominal(model)),
+            None => estimated_states(model, &nominal(model), runs),
         };
         let mut scales = Vec::new();
         let mut lower = Vec::new();

@@ -2,7 +2,7 @@
 
 use loopsight_core::model::{Model, signals};
 use loopsight_core::run::Run;
-use loopsight_core::simulate::{Simulator, free_run};
+use loopsight_core::simulate::{Simulator, follow};
 use serde::Serialize;
 
 use crate::problem::Solution;
@@ -62,30 +62,21 @@ fn collect(model: &Model, solution: &Solution, runs: &[Run], signal: usize) -> S
         quantities: vec![Vec::new(); n],
     };
     for (index, (run, x0)) in runs.iter().zip(&solution.states).enumerate() {
-        let mut predicted = Vec::with_capacity(run.len());
         let mut simulator = Simulator::new(model, &solution.values);
-        free_run(&mut simulator, x0.as_slice(), run, |_, y| {
-            predicted.push(y[signal])
-        });
-        let mut simulator = Simulator::new(model, &solution.values);
-        simulator.reset(x0.as_slice(), run.input(0));
-        for (k, free) in predicted.iter().enumerate() {
-            if k > 0 {
-                simulator.advance(run.time[k], run.input(k - 1));
-            }
+        follow(&mut simulator, x0.as_slice(), run, |k, y, now| {
             let measured = run.sample(k)[signal];
-            let error = measured - free;
+            let error = measured - y[signal];
             if !error.is_finite() {
-                continue;
+                return;
             }
             samples.error.push(error);
             samples.measured.push(measured);
             samples.time.push(run.time[k]);
             samples.run.push(index);
-            for (list, value) in samples.quantities.iter_mut().zip(simulator.signals()) {
+            for (list, value) in samples.quantities.iter_mut().zip(now.signals()) {
                 list.push(*value);
             }
-        }
+        });
     }
     samples
 }

@@ -42,6 +42,7 @@ pub fn simulate_inputs(
         measured: vec![0.0; time.len() * n_measured],
         n_inputs,
         n_measured,
+        observer: None,
     };
     for (k, row) in run.measured.chunks_exact_mut(n_measured).enumerate() {
         if k > 0 {

@@ -114,6 +114,7 @@ pub(crate) fn comparison(runs: Vec<RunTrace>) -> Comparison {
         fit_percent: 92.1,
         signals: scores(),
         faults: vec![],
+        held: None,
         runs,
     }
 }

@@ -87,6 +87,7 @@ fn without_noise_the_papers_recursion_returns_the_six_parameters() {
         measured,
         n_inputs: 2,
         n_measured: 2,
+        observer: None,
     };
     let fit = fitted(&truth, run, Method::Rls, Scheme::Euler);
     for name in NAMES {

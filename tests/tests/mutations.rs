@@ -126,6 +126,7 @@ fn short_run(model: &Model) -> Run {
         measured: (0..n).flat_map(|k| row(k, n_measured)).collect(),
         n_inputs,
         n_measured,
+        observer: None,
     }
 }
 

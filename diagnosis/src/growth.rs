@@ -1,0 +1,135 @@
+//! How errors of the state grow in a free run.
+
+use nalgebra::DMatrix;
+
+use crate::observer::Step;
+
+/// An error of the state as large as its own deviation may become this many times as large, in
+/// deviations of what is measured, in a free run.
+const TOLERATED: f64 = 10.0;
+/// What has grown so much in the time of the whole horizon grows exponentially.
+const EXPONENTIAL: f64 = 3.0;
+/// Instants of a run from which errors are followed, as fractions of its length.
+const STARTS: [f64; 3] = [0.0, 0.25, 0.5];
+/// Share of the instants from which errors must grow.
+const MOSTLY: f64 = 0.5;
+
+/// The linearisations along a run.
+pub(crate) struct Path {
+    time: Vec<f64>,
+    a: Vec<DMatrix<f64>>,
+    c: Vec<DMatrix<f64>>,
+    /// States along it.
+    x: Vec<Vec<f64>>,
+}
+
+impl Path {
+    pub(crate) fn new(time: &[f64]) -> Self {
+        Self {
+            time: time.to_vec(),
+            a: Vec::new(),
+            c: Vec::new(),
+            x: Vec::new(),
+        }
+    }
+
+    pub(crate) fn push(&mut self, step: &Step<'_>) {
+        self.a.push(step.a.clone());
+        self.c.push(step.c.clone());
+        self.x.push(step.x.to_vec());
+    }
+}
+
+/// How errors of the state grow where they grow too much.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Growth {
+    /// Time in which they do, s.
+    pub(crate) horizon: f64,
+    /// Time in which they double, where they grow exponentially, s.
+    pub(crate) doubling: Option<f64>,
+    /// States that show in what is measured, by index.
+    pub(crate) observed: Vec<usize>,
+}
+
+impl Growth {
+    /// Follows errors of the size of the states' deviations through `paths`; `None` where they stay
+    /// below [`TOLERATED`] times the `deviation` of each measured signal.
+    pub(crate) fn of(paths: &[Path], deviation: &[f64]) -> Option<Self> {
+        let nx = paths.iter().find_map(|p| p.a.first())?.ncols();
+        let size = deviations(paths, nx);
+        let mut seen = vec![false; nx];
+        let mut followed = 0usize;
+        let mut times = Vec::new();
+        let mut rates = Vec::new();
+        for path in paths {
+            for start in STARTS {
+                let first = (start * path.a.len() as f64) as usize;
+                let mut m = DMatrix::from_fn(nx, nx, |i, j| if i == j { size[i] } else { 0.0 });
+                followed += usize::from(first < path.a.len());
+                for k in first..path.a.len() {
+                    let y = &path.c[k] * &m;
+                    m = &path.a[k] * m;
+                    let mut most = 0.0f64;
+                    for (row, deviation) in deviation.iter().enumerate() {
+                        for column in 0..nx {
+                            let share = y[(row, column)].abs() / deviation;
+                            if share.is_finite() && share > 0.0 {
+                                seen[column] = true;
+                                most = most.max(share);
+                            }
+                        }
+                    }
+                    if most > TOLERATED {
+                        let time = path.time[k + 1] - path.time[first];
+                        times.push(time);
+                        rates.push(radius(&m, &size).ln() / time);
+                        break;
+                    }
+                }
+            }
+        }
+        if times.is_empty() || (times.len() as f64) < MOSTLY * followed as f64 {
+            return None;
+        }
+        let horizon = median(&mut times);
+        let rate = median(&mut rates);
+        Some(Self {
+            horizon,
+            doubling: (rate * horizon > EXPONENTIAL.ln()).then(|| 2f64.ln() / rate),
+            observed: (0..nx).filter(|i| seen[*i]).collect(),
+        })
+    }
+}
+
+/// Standard deviations of the states.
+fn deviations(paths: &[Path], nx: usize) -> Vec<f64> {
+    (0..nx)
+        .map(|i| {
+            let values = || paths.iter().flat_map(|p| p.x.iter().map(move |x| x[i]));
+            let n = values().count().max(1) as f64;
+            let mean = values().sum::<f64>() / n;
+            (values().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n).sqrt()
+        })
+        .collect()
+}
+
+/// Largest magnitude of an eigenvalue of the transition `m` of states in units of `size`.
+fn radius(m: &DMatrix<f64>, size: &[f64]) -> f64 {
+    let mut transition = m.clone();
+    for (j, size) in size.iter().enumerate() {
+        transition
+            .column_mut(j)
+            .scale_mut(if *size > 0.0 { 1.0 / size } else { 0.0 });
+    }
+    nalgebra::Schur::try_new(transition, 1e-12, 1000).map_or(1.0, |schur| {
+        schur
+            .complex_eigenvalues()
+            .iter()
+            .fold(1.0, |most: f64, value| most.max(value.norm()))
+    })
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}

@@ -1,0 +1,323 @@
+//! Whether a model can be simulated from the inputs alone, and what holds it where it cannot.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use loopsight_core::model::Model;
+use loopsight_core::run::Run;
+use loopsight_core::simulate::{Simulator, StateObserver};
+use loopsight_core::{DUAL_WIDTH, Dual, Real, derivative, variable};
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use crate::floor;
+use crate::growth::{Growth, Path};
+
+/// How a free run was held to the measurements, and why.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Held {
+    /// `unstable` or `integrating`.
+    pub because: Because,
+    /// Time in which the observer forgets, s.
+    pub horizon_s: f64,
+    /// In words.
+    pub statement: String,
+}
+
+/// Why a model cannot be simulated from the inputs alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Because {
+    /// Errors of the state grow exponentially.
+    Unstable,
+    /// Errors of the state add up over time.
+    Integrating,
+}
+
+impl Held {
+    /// What was done to `runs`; `None` where they are simulated from the inputs alone.
+    pub(crate) fn of(runs: &[Run]) -> Option<Self> {
+        let observer = runs.iter().find_map(|run| run.observer.as_deref())?;
+        let horizon = observer.horizon;
+        let (because, why) = match observer.doubling {
+            Some(time) => (
+                Because::Unstable,
+                format!(
+                    "the model is unstable: an error of its state doubles in {}",
+                    seconds(time)
+                ),
+            ),
+            None => (
+                Because::Integrating,
+                "the model integrates: an error of its state adds up".to_owned(),
+            ),
+        };
+        Some(Self {
+            because,
+            horizon_s: horizon,
+            statement: format!(
+                "free run over a horizon of {}, held to the measurements by an observer that forgets what is older: {why}",
+                seconds(horizon)
+            ),
+        })
+    }
+}
+
+/// Two significant digits.
+fn seconds(value: f64) -> String {
+    let decimals = (1.0 - value.abs().log10().floor()).clamp(0.0, 4.0) as usize;
+    format!("{value:.decimals$} s")
+}
+
+/// Samples of one run over which the growth of errors is looked at.
+const LOOKED_AT: usize = 20_000;
+/// Shortest horizon, and that of the first look, in sampling periods.
+const SHORTEST: f64 = 10.0;
+const FIRST: f64 = 20.0;
+/// Noise is taken to be at least this share of a signal's standard deviation.
+const LEAST_NOISE: f64 = 1e-4;
+/// An unobserved state is no further from the truth than this many times its deviation.
+const FURTHEST: f64 = 1e3;
+
+/// `runs` with an observer each where `model` needs one; as they are where it does not.
+pub(crate) fn hold<'r>(model: &Model, values: &[f64], runs: &'r [Run]) -> Cow<'r, [Run]> {
+    growth(model, values, runs).map_or(Cow::Borrowed(runs), |growth| {
+        hold_with(model, values, runs, &growth)
+    })
+}
+
+/// How errors of the state grow; `None` where they do not.
+pub(crate) fn growth(model: &Model, values: &[f64], runs: &[Run]) -> Option<Growth> {
+    if runs.iter().any(|r| r.observer.is_some()) || values.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let design = Design::new(model, values, runs);
+    let paths: Vec<Path> = runs.iter().filter_map(|run| design.path(run)).collect();
+    Growth::of(&paths, &design.deviation)
+}
+
+/// `runs` with the observer that suits `growth`.
+pub(crate) fn hold_with<'r>(
+    model: &Model,
+    values: &[f64],
+    runs: &'r [Run],
+    growth: &Growth,
+) -> Cow<'r, [Run]> {
+    let design = Design::new(model, values, runs);
+    let held: Option<Vec<Run>> = runs.iter().map(|run| design.hold(run, growth)).collect();
+    held.map_or(Cow::Borrowed(runs), Cow::Owned)
+}
+
+/// `others` with the observer that suits the horizon of `runs` and the `values` it was made for.
+pub(crate) fn hold_alike<'r>(model: &Model, others: &'r [Run], runs: &[Run]) -> Cow<'r, [Run]> {
+    let Some(observer) = runs.iter().find_map(|run| run.observer.as_deref()) else {
+        return Cow::Borrowed(others);
+    };
+    let growth = Growth {
+        horizon: observer.horizon,
+        doubling: observer.doubling,
+        observed: observer.observed.clone(),
+    };
+    hold_with(model, &observer.values, others, &growth)
+}
+
+/// What the gains of an observer are found with.
+struct Design<'a> {
+    /// Without effects that remember: gains need not be exact, and a plant state is all they correct.
+    model: Model,
+    values: &'a [f64],
+    /// By signal.
+    deviation: Vec<f64>,
+    noise: Vec<f64>,
+}
+
+impl<'a> Design<'a> {
+    fn new(model: &Model, values: &'a [f64], runs: &[Run]) -> Self {
+        let mut model = model.clone();
+        model
+            .effects
+            .retain(|e| !e.meta.memory && e.meta.states == 0);
+        let mut deviation = Vec::new();
+        let mut noise = Vec::new();
+        for (signal, measured) in model.measured.iter().enumerate() {
+            let (sensor, std) = floor::noise(&measured.sensor, signal, runs);
+            noise.push(sensor.max(LEAST_NOISE * std).max(f64::MIN_POSITIVE));
+            deviation.push(std);
+        }
+        Self {
+            model,
+            values,
+            deviation,
+            noise,
+        }
+    }
+
+    /// The linearisations along the first samples of a run.
+    fn path(&self, run: &Run) -> Option<Path> {
+        let n = run.len().min(LOOKED_AT);
+        let fade = FIRST * run.median_period();
+        let mut path = Path::new(&run.time[..n]);
+        self.filter(run, n, fade, &self.certain(1.0), |step| path.push(step))?;
+        Some(path)
+    }
+
+    fn hold(&self, run: &Run, growth: &Growth) -> Option<Run> {
+        let mut held = run.clone();
+        let horizon = growth.horizon.max(SHORTEST * run.median_period());
+        let nx = self.model.n_states();
+        let stride = nx * run.n_measured;
+        let mut gains = vec![0.0; stride * run.len()];
+        let mut uncertain = self.certain(1.0);
+        let warm = run
+            .time
+            .iter()
+            .position(|t| t - run.time[0] > 3.0 * horizon)
+            .unwrap_or(run.len());
+        // The initial state is estimated, so the gains begin as they go on.
+        uncertain = self.filter(run, warm, horizon, &uncertain, |_| {})?;
+        self.filter(run, run.len(), horizon, &uncertain, |step| {
+            let rows = gains[step.k * stride..].chunks_exact_mut(run.n_measured);
+            for (row, to) in rows.take(nx).enumerate() {
+                for (column, gain) in to.iter_mut().enumerate() {
+                    *gain = step.gain[(row, column)];
+                }
+            }
+        })?;
+        held.observer = Some(Arc::new(StateObserver {
+            gains,
+            observed: growth.observed.clone(),
+            horizon,
+            doubling: growth.doubling,
+            stride,
+            values: self.values.to_vec(),
+        }));
+        Some(held)
+    }
+
+    /// Uncertainty of the state before anything is known: many deviations of what is measured.
+    fn certain(&self, unknown: f64) -> DMatrix<f64> {
+        let nx = self.model.n_states();
+        DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| {
+            let measured = self.model.measured.iter().position(|m| m.index == i);
+            let scale = measured.map_or(unknown, |signal| self.deviation[signal]);
+            let scale = if scale > 0.0 { scale } else { unknown };
+            100.0 * scale * scale
+        }))
+    }
+
+    /// The extended Kalman filter without process noise, that forgets: what was measured `t` ago has
+    /// the weight `e^(-2t/fade)`, so that no error lasts longer, and an unstable mode is turned
+    /// around. With `A` the derivative of the state by the state before, and `C` that of the
+    /// measurement (a mean sees the interval, not its end),
+    ///
+    /// ```text
+    /// P <- e^(2h/fade) P    S = C P Cᵀ + R    K = A P Cᵀ S⁻¹    P <- A P Aᵀ - K S Kᵀ
+    /// ```
+    ///
+    /// (B. D. O. Anderson, 1971, "Stability properties of Kalman–Bucy filters", Journal of the
+    /// Franklin Institute 291, 137–144; H. W. Sorenson, J. E. Sacks, 1971, "Recursive fading memory
+    /// filtering", Information Sciences 3, 101–119.) Returns the last `P`; `None` where it diverges.
+    fn filter(
+        &self,
+        run: &Run,
+        samples: usize,
+        fade: f64,
+        uncertain: &DMatrix<f64>,
+        mut each: impl FnMut(&Step<'_>),
+    ) -> Option<DMatrix<f64>> {
+        let (nx, ny) = (self.model.n_states(), self.model.measured.len());
+        let mut p = uncertain.clone();
+        if run.len() < 2 {
+            return Some(p);
+        }
+        let values: Vec<Dual> = self.values.iter().map(|v| Dual::of(*v)).collect();
+        // As many simulators as it takes to carry the derivatives by all states.
+        let mut simulators: Vec<Simulator<'_, Dual>> = (0..nx)
+            .step_by(DUAL_WIDTH)
+            .map(|_| Simulator::new(&self.model, &values))
+            .collect();
+        let mut x = self.model.state_from(self.values, run.sample(0));
+        let start: Vec<Dual> = x.iter().map(|v| Dual::of(*v)).collect();
+        for simulator in &mut simulators {
+            simulator.reset(&start, run.input(0));
+        }
+        let mut predicted = vec![Dual::of(0.0); ny];
+        let (mut a, mut c) = (DMatrix::zeros(nx, nx), DMatrix::zeros(ny, nx));
+        let mut innovation = DVector::zeros(ny);
+        for k in 1..samples.min(run.len()) {
+            for (block, simulator) in simulators.iter_mut().enumerate() {
+                let first = block * DUAL_WIDTH;
+                for (i, state) in simulator.state_mut().iter_mut().enumerate() {
+                    *state = variable(x[i], i.wrapping_sub(first));
+                }
+                simulator.advance(run.time[k] - run.time[0], run.input(k - 1));
+                simulator.measure(&mut predicted);
+                for column in first..(first + DUAL_WIDTH).min(nx) {
+                    for (row, state) in simulator.state().iter().enumerate() {
+                        a[(row, column)] = derivative(state, column - first);
+                    }
+                    for (row, y) in predicted.iter().enumerate() {
+                        c[(row, column)] = derivative(y, column - first) / self.noise[row];
+                    }
+                }
+            }
+            for (i, (y, p)) in run.sample(k).iter().zip(&predicted).enumerate() {
+                innovation[i] = (y - p.value()) / self.noise[i];
+                if !innovation[i].is_finite() {
+                    innovation[i] = 0.0;
+                    c.row_mut(i).fill(0.0);
+                }
+            }
+            p *= (2.0 * (run.time[k] - run.time[k - 1]) / fade).exp();
+            let pc = &p * c.transpose();
+            let s = &c * &pc + DMatrix::identity(ny, ny);
+            let mut gain = &a * &pc * s.clone().cholesky()?.inverse();
+            p = &a * &p * a.transpose() - &gain * &s * gain.transpose();
+            p = (&p + p.transpose()) * 0.5;
+            for i in 0..nx {
+                let most = FURTHEST * FURTHEST * uncertain[(i, i)];
+                if p[(i, i)] > most {
+                    let less = (most / p[(i, i)]).sqrt();
+                    p.row_mut(i).scale_mut(less);
+                    p.column_mut(i).scale_mut(less);
+                }
+                p[(i, i)] = p[(i, i)].max(0.0);
+            }
+            let correction = &gain * &innovation;
+            if let Some(state) = simulators.first().map(Simulator::state) {
+                for (i, x) in x.iter_mut().enumerate() {
+                    *x = state[i].value() + correction[i];
+                }
+            }
+            if x.iter().any(|v| !v.is_finite()) {
+                return None;
+            }
+            for (mut column, noise) in gain.column_iter_mut().zip(&self.noise) {
+                column /= *noise;
+            }
+            for (mut row, noise) in c.row_iter_mut().zip(&self.noise) {
+                row *= *noise;
+            }
+            each(&Step {
+                k,
+                x: &x,
+                a: &a,
+                c: &c,
+                gain: &gain,
+            });
+        }
+        Some(p)
+    }
+}
+
+/// One sample of a filter.
+pub(crate) struct Step<'s> {
+    pub(crate) k: usize,
+    /// The corrected state.
+    pub(crate) x: &'s [f64],
+    /// Derivative of the state by the state before.
+    pub(crate) a: &'s DMatrix<f64>,
+    /// Derivative of the measurement by the state before.
+    pub(crate) c: &'s DMatrix<f64>,
+    pub(crate) gain: &'s DMatrix<f64>,
+}
