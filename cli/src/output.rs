@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use loopsight_diagnosis::{Comparison, Fit, Verdict};
+use loopsight_diagnosis::{Comparison, Fit, Held, Verdict};
 use loopsight_recordings::{Fault, Severity};
 use serde::Serialize;
 
@@ -124,12 +124,18 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
         })
         .collect();
     format!(
-        "{}free run: error {} of the standard deviation, fit {:.2} %\n{}",
+        "{}free run: error {} of the standard deviation, fit {:.2} %\n{}{}",
         faults(&comparison.faults),
         percent(comparison.nrmse),
         comparison.fit_percent,
+        held(comparison.observer.as_ref()),
         table(&["signal", "rmse", "nrmse", "fit", "one-step nrmse"], &rows)
     )
+}
+
+/// That a free run was held to the measurements, where it was; with a line's end.
+pub(crate) fn held(observer: Option<&Held>) -> String {
+    observer.map_or_else(String::new, |held| format!("note: {}\n", held.statement))
 }
 
 pub(crate) fn fit(fit: &Fit) -> String {

@@ -25,7 +25,7 @@ pub struct Comparison {
     /// How the free run was held to the measurements; absent where it is simulated from the inputs
     /// alone.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub held: Option<Held>,
+    pub observer: Option<Held>,
     /// Everything a picture needs.
     #[serde(skip)]
     pub runs: Vec<RunTrace>,
@@ -39,7 +39,7 @@ impl Comparison {
             fit_percent: f64::NAN,
             signals: Vec::new(),
             faults: Vec::new(),
-            held: None,
+            observer: None,
             runs: Vec::new(),
         }
     }
@@ -69,7 +69,7 @@ pub struct SignalTrace {
     pub unit: String,
     /// What was measured (NaN: missing).
     pub measured: Vec<f64>,
-    /// The model simulated from the inputs alone, or [held](Comparison::held) to the measurements.
+    /// The model simulated from the inputs alone, or [held](Comparison::observer) to the measurements.
     pub free_run: Vec<f64>,
     /// The model's prediction from the previous sample.
     pub one_step: Vec<f64>,
@@ -113,7 +113,7 @@ fn of_run(name: &str) -> String {
 /// each run, and predicts each sample from the one before.
 ///
 /// A model that is unstable or integrates cannot be simulated like that: it is held to the
-/// measurements by an observer, as slow as it may be, and [`Comparison::held`] says so.
+/// measurements by an observer, as slow as it may be, and [`Comparison::observer`] says so.
 pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparison, CompareError> {
     let missing = model.missing_values();
     if !missing.is_empty() {
@@ -146,7 +146,7 @@ pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparis
         fit_percent: 100.0 * (1.0 - nrmse),
         signals,
         faults: faults.to_vec(),
-        held: Held::of(&runs),
+        observer: Held::of(&runs),
         runs: traces,
     })
 }

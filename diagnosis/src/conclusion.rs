@@ -90,7 +90,7 @@ pub struct Diagnosis {
     /// How free runs were held to the measurements; absent where they are simulated from the inputs
     /// alone.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub held: Option<Held>,
+    pub observer: Option<Held>,
     /// The nominal model, fitted.
     #[serde(skip)]
     pub model: Option<Model>,

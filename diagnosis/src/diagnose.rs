@@ -250,7 +250,7 @@ pub(crate) fn diagnose_above(
         where_it_fails: statements,
         faults: faults.to_vec(),
         advice,
-        held: Held::of(runs),
+        observer: Held::of(runs),
         model: Some(fitted_nominal),
         nominal_fit,
     })
@@ -277,7 +277,7 @@ fn refused(verdict: Conclusion, faults: &[Fault], advice: Vec<Advice>) -> Diagno
         where_it_fails: Vec::new(),
         faults: faults.to_vec(),
         advice,
-        held: None,
+        observer: None,
         model: None,
         nominal_fit: f64::NAN,
     }

@@ -133,3 +133,61 @@ fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: f64 = 0.01;
+
+    /// Samples of `x(k+1) = A x(k)` with the first state measured; the states swing by `size`.
+    fn path(a: [f64; 4], size: [f64; 2]) -> Path {
+        let n = 2000;
+        let time: Vec<f64> = (0..=n).map(|k| PERIOD * f64::from(k)).collect();
+        let mut path = Path::new(&time);
+        for k in 0..n {
+            let phase = 1.7 * PERIOD * f64::from(k);
+            path.push(&Step {
+                k: k as usize,
+                x: &[size[0] * phase.sin(), size[1] * phase.cos()],
+                a: &DMatrix::from_row_slice(2, 2, &a),
+                c: &DMatrix::from_row_slice(1, 2, &a[..2]),
+                gain: &DMatrix::zeros(2, 1),
+            });
+        }
+        path
+    }
+
+    #[test]
+    fn what_dies_out_needs_no_help() {
+        let decay = (-2.0 * PERIOD).exp();
+        let damped = [1.0, PERIOD, 0.0, decay];
+        assert_eq!(Growth::of(&[path(damped, [1.0, 1.7])], &[0.7]), None);
+    }
+
+    #[test]
+    fn a_double_integral_grows_with_time() {
+        let free = [1.0, PERIOD, 0.0, 1.0];
+        let growth = Growth::of(&[path(free, [1.0, 1.7])], &[0.7]).unwrap();
+        // An error of the speed as large as its deviation 1.7/√2 moves the position by 7 after:
+        let expected = 7.0 * 2f64.sqrt() / 1.7;
+        assert!((growth.horizon - expected).abs() < 0.1, "{growth:?}");
+        assert_eq!(growth.doubling, None);
+        assert_eq!(growth.observed, [0, 1]);
+    }
+
+    #[test]
+    fn an_unstable_mode_tells_its_rate() {
+        let rate = 3.0f64;
+        let grow = (rate * PERIOD).exp();
+        let growth = Growth::of(&[path([grow, 0.0, 0.0, 1.0], [1.0, 1.7])], &[0.7]).unwrap();
+        assert!(
+            (growth.horizon - 10f64.ln() / rate).abs() < 0.02,
+            "{growth:?}"
+        );
+        let doubling = growth.doubling.unwrap();
+        assert!((doubling - 2f64.ln() / rate).abs() < 1e-3, "{doubling}");
+        // The second state never shows in what is measured.
+        assert_eq!(growth.observed, [0]);
+    }
+}

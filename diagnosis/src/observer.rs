@@ -43,20 +43,23 @@ impl Held {
             Some(time) => (
                 Because::Unstable,
                 format!(
-                    "the model is unstable: an error of its state doubles in {}",
+                    "is unstable (an error of its state doubles in {})",
                     seconds(time)
                 ),
             ),
             None => (
                 Because::Integrating,
-                "the model integrates: an error of its state adds up".to_owned(),
+                format!(
+                    "integrates (an error of its state has grown tenfold after {})",
+                    seconds(horizon)
+                ),
             ),
         };
         Some(Self {
             because,
             horizon_s: horizon,
             statement: format!(
-                "free run over a horizon of {}, held to the measurements by an observer that forgets what is older: {why}",
+                "the model {why}: its free run is held to the measurements by an observer that forgets them within {}",
                 seconds(horizon)
             ),
         })

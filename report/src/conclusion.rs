@@ -123,7 +123,7 @@ pub(crate) fn found(diagnosis: &Diagnosis) -> Option<&Explanation> {
 pub(crate) fn of_diagnosis(diagnosis: &Diagnosis) -> Verdict {
     let nominal = percent(diagnosis.nominal.nrmse);
     let floor = percent(diagnosis.floor.nrmse);
-    let (headline, because, class) = match diagnosis.verdict {
+    let (headline, mut because, class) = match diagnosis.verdict {
         Conclusion::EffectMissing => {
             let place = diagnosis
                 .missing
@@ -202,6 +202,9 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis) -> Verdict {
             "refused",
         ),
     };
+    if let Some(held) = &diagnosis.observer {
+        because.push(format!("Note: {}.", held.statement));
+    }
     Verdict {
         headline,
         because,

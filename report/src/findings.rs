@@ -113,7 +113,7 @@ pub(crate) fn diagnosis(verdict: Conclusion) -> Diagnosis {
             why: "these data cannot tell".into(),
             experiment: "several levels".into(),
         }],
-        held: None,
+        observer: None,
         model: (!refused).then(|| model(0)),
         nominal_fit: if refused { f64::NAN } else { 0.1 },
     }

@@ -114,7 +114,7 @@ pub(crate) fn comparison(runs: Vec<RunTrace>) -> Comparison {
         fit_percent: 92.1,
         signals: scores(),
         faults: vec![],
-        held: None,
+        observer: None,
         runs,
     }
 }

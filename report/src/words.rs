@@ -34,6 +34,9 @@ pub(crate) fn verdict(comparison: &Comparison) -> String {
         };
         text.push_str(&which);
     }
+    if let Some(held) = &comparison.observer {
+        text.push_str(&format!(" Note: {}.", held.statement));
+    }
     text
 }
 

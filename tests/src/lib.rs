@@ -7,6 +7,8 @@
     reason = "what is built here is right, and a panic is how a test fails"
 )]
 
+pub mod balance;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -97,9 +97,10 @@ pub(crate) fn sentence(diagnosis: &Diagnosis) -> String {
 
 fn text(diagnosis: &Diagnosis) -> String {
     let mut text = format!(
-        "{}{}\n",
+        "{}{}\n{}",
         output::faults(&diagnosis.faults),
-        sentence(diagnosis)
+        sentence(diagnosis),
+        output::held(diagnosis.observer.as_ref())
     );
     if !diagnosis.candidates.is_empty() {
         let rows: Vec<Vec<String>> = diagnosis.candidates.iter().map(row).collect();

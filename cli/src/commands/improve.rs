@@ -112,6 +112,10 @@ fn text(improvement: &Improvement) -> String {
     }
     if let Some(last) = improvement.diagnoses.last() {
         text.push_str(&sentence(last));
+        if last.observer.is_some() {
+            text.push('\n');
+            text.push_str(output::held(last.observer.as_ref()).trim_end());
+        }
     }
     if let Some(best) = &improvement.best {
         text.push_str("\n\n");
