@@ -1,6 +1,7 @@
 //! A composed model in motion: the free run that everything is judged by.
 
 mod bound;
+mod follow;
 mod history;
 mod observer;
 mod push;
@@ -10,10 +11,10 @@ use std::borrow::Cow;
 
 use crate::model::Model;
 use crate::registry::HostReal;
-use crate::run::Run;
 use crate::{NoPast, Place, Rk4, substeps};
 
 use bound::{Bounds, Scene};
+pub use follow::{follow, free_run};
 use history::{Between, History};
 pub use observer::StateObserver;
 use push::Pushed;
@@ -468,44 +469,6 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                     *to += scene.contribution(bound, *to, &self.histories[history]);
                 }
             }
-        }
-    }
-}
-
-/// The model simulated over a run from the inputs alone, from the plant state `x0`; held to the
-/// measurements where the run has an [observer](Run::observer).
-///
-/// `each` gets the index of the sample and what the sensors would have read. The first sample is
-/// the initial state itself.
-pub fn free_run<S: HostReal>(
-    simulator: &mut Simulator<'_, S>,
-    x0: &[S],
-    run: &Run,
-    mut each: impl FnMut(usize, &[S]),
-) {
-    follow(simulator, x0, run, |k, predicted, _| each(k, predicted));
-}
-
-/// As [`free_run`]; `each` gets the simulator as well, as it is at the sample.
-pub fn follow<'m, S: HostReal>(
-    simulator: &mut Simulator<'m, S>,
-    x0: &[S],
-    run: &Run,
-    mut each: impl FnMut(usize, &[S], &mut Simulator<'m, S>),
-) {
-    let Some(&start) = run.time.first() else {
-        return;
-    };
-    let mut predicted = vec![S::zero(); simulator.model.measured.len()];
-    simulator.reset(x0, run.input(0));
-    for k in 0..run.len() {
-        if k > 0 {
-            simulator.advance(run.time[k] - start, run.input(k - 1));
-        }
-        simulator.measure(&mut predicted);
-        each(k, &predicted, simulator);
-        if let Some(observer) = run.observer.as_deref() {
-            simulator.correct(observer, k, run.sample(k), &predicted);
         }
     }
 }
