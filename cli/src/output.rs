@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use loopsight_diagnosis::{Comparison, Fit, Held, Verdict};
+use loopsight_diagnosis::{Comparison, Fit, Held, ResidualForce, Verdict};
 use loopsight_recordings::{Fault, Severity};
 use serde::Serialize;
 
@@ -105,6 +105,18 @@ pub(crate) fn faults(faults: &[Fault]) -> String {
             Severity::Fatal => "fault",
         };
         text.push_str(&format!("{word}: {fault}\n"));
+    }
+    text
+}
+
+/// What is known of a force that the library does not have.
+pub(crate) fn residual_force(force: &ResidualForce) -> String {
+    let mut text = format!("\nresidual force: {}", force.statement);
+    if let Some(expression) = &force.expression {
+        text.push_str(&format!(
+            "\n\nto begin with, at the end of the model file (then fit, look, and edit):\n\n{}",
+            expression.toml.trim_end()
+        ));
     }
     text
 }

@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::advice::Advice;
 use crate::fit::Estimate;
 use crate::observer::Held;
+use crate::residual_force::ResidualForce;
 use crate::where_it_fails::Statement;
 
 /// An error, as the contract has it.
@@ -83,6 +84,9 @@ pub struct Diagnosis {
     pub candidates: Vec<Explanation>,
     /// Where the model fails, in words.
     pub where_it_fails: Vec<Statement>,
+    /// The force that is missing where no effect of the library is it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub residual_force: Option<ResidualForce>,
     /// Faults of the log.
     pub faults: Vec<Fault>,
     /// Experiments that would tell more.

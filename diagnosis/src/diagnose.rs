@@ -20,6 +20,7 @@ use crate::observer::{Held, hold_alike};
 use crate::output_error::prepare;
 use crate::prediction::signal_rms;
 use crate::problem::{Effort, Problem, Solution};
+use crate::residual_force;
 use crate::sufficiency;
 use crate::where_it_fails::where_it_fails;
 
@@ -237,6 +238,9 @@ pub(crate) fn diagnose_above(
         None => Conclusion::NothingMissing,
     };
     let statements = where_it_fails(&fitted_nominal, &nominal, runs);
+    let residual_force = (verdict == Conclusion::UnknownEffect)
+        .then(|| residual_force::of_solution(&fitted_nominal, &nominal, runs))
+        .flatten();
     let advice = advice::advice(&fitted_nominal, verdict, explanations.first());
     explanations.truncate(REPORTED);
     Ok(Diagnosis {
@@ -248,6 +252,7 @@ pub(crate) fn diagnose_above(
         missing,
         candidates: explanations,
         where_it_fails: statements,
+        residual_force,
         faults: faults.to_vec(),
         advice,
         observer: Held::of(runs),
@@ -275,6 +280,7 @@ fn refused(verdict: Conclusion, faults: &[Fault], advice: Vec<Advice>) -> Diagno
         missing: None,
         candidates: Vec::new(),
         where_it_fails: Vec::new(),
+        residual_force: None,
         faults: faults.to_vec(),
         advice,
         observer: None,

@@ -8,12 +8,12 @@
     light: {
       ink: "#1d2126", soft: "#59616b", paper: "#ffffff", grid: "#e6e9ed", zero: "#aab2bc", shade: "rgba(213,94,0,.16)",
       measured: "#555b63", commanded: "#555b63", model: "#d55e00", after: "#0072b2", mean_after: "#0072b2", one_step: "#c0588f", reference: "#008f6b", residual: "#7d3f98",
-      points: "rgba(85,91,99,.28)", mean: "#d55e00", series: ["#0072b2", "#c98300", "#008f6b", "#c0588f"],
+      points: "rgba(85,91,99,.28)", mean: "#d55e00", dots: "#d55e00", dots_after: "#0072b2", series: ["#0072b2", "#c98300", "#008f6b", "#c0588f"],
     },
     dark: {
       ink: "#e4e7eb", soft: "#a3abb5", paper: "#1c2025", grid: "#2c3239", zero: "#5a636e", shade: "rgba(255,157,77,.22)",
       measured: "#b9c0c9", commanded: "#b9c0c9", model: "#ff9d4d", after: "#6bb7f0", mean_after: "#6bb7f0", one_step: "#e79ac4", reference: "#3dd6a3", residual: "#cf9ae8",
-      points: "rgba(185,192,201,.28)", mean: "#ff9d4d", series: ["#6bb7f0", "#f0c04a", "#3dd6a3", "#e79ac4"],
+      points: "rgba(185,192,201,.28)", mean: "#ff9d4d", dots: "#ff9d4d", dots_after: "#6bb7f0", series: ["#6bb7f0", "#f0c04a", "#3dd6a3", "#e79ac4"],
     },
   };
   const dashes = ["solid", "dot", "dash", "dashdot"];
@@ -30,7 +30,8 @@
         const color = trace.role === "series" ? theme.series[nth] : theme[trace.role];
         const x = trace.x ?? chart.times;
         const common = { x, yaxis, xaxis: "x", entry: trace.role + trace.name, visible: !trace.hidden };
-        const mean = trace.role === "mean" || trace.role === "mean_after";
+        const dots = trace.role === "dots" || trace.role === "dots_after";
+        const mean = dots || trace.role === "mean" || trace.role === "mean_after";
         if (trace.spread && !mean) {
           const edge = sign => trace.y.map((y, k) => y === null || trace.spread[k] === null ? null : y + sign * trace.spread[k]);
           const band = { ...common, mode: "lines", line: { width: 0 }, hoverinfo: "skip" };
@@ -44,7 +45,7 @@
           const beneath = trace.role === "measured" && panel.traces.some(t => t.role === "after");
           const width = beneath ? 5 : trace.role === "measured" ? 1.3 : 1.7;
           if (beneath) drawn.opacity = 0.4;
-          drawn.mode = mean ? "lines+markers" : "lines";
+          drawn.mode = dots ? "markers" : mean ? "lines+markers" : "lines";
           drawn.line = { color, width, dash: trace.role === "commanded" ? "dot" : dashes[nth], shape: trace.step ? "hv" : "linear" };
           drawn.marker = { color, size: 6 };
           drawn.hovertemplate = "%{y:.5~g}";

@@ -25,6 +25,9 @@ pub(crate) enum Role {
     Mean,
     /// As [`Role::Mean`], of a model after it was changed.
     MeanAfter,
+    /// Means without a line between them, and a second series of the like.
+    Dots,
+    DotsAfter,
     /// One of several alike: inputs, parameters.
     Series,
 }

@@ -10,6 +10,7 @@ use crate::html::marked;
 use crate::next;
 use crate::numbers::percent;
 use crate::page::{Context, page, section};
+use crate::residual_force::residual_force;
 
 /// The page of a diagnosis: the verdict, the model `before` and `after` the best explanation was
 /// added, held against the same measurements, where it fails, every explanation that was tried,
@@ -52,6 +53,7 @@ pub fn diagnosis_page(
         after,
         names,
     ));
+    body.push_str(&residual_force(diagnosis.residual_force.as_ref()));
     if !diagnosis.candidates.is_empty() {
         body.push_str(&section(
             "What could be missing",

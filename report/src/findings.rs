@@ -104,6 +104,7 @@ pub(crate) fn diagnosis(verdict: Conclusion) -> Diagnosis {
             statement: "73 % of it after changes".into(),
             share_of_squared_error: 0.73,
         }],
+        residual_force: None,
         faults: if verdict == Conclusion::LogFaulty {
             vec![fault]
         } else {

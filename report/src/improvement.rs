@@ -13,6 +13,7 @@ use crate::html::{escape, identifier, list};
 use crate::next;
 use crate::numbers::percent;
 use crate::page::{Context, page, section};
+use crate::residual_force::residual_force;
 
 /// The page of an improvement: the verdict, the error step by step, the model `before` and `after`
 /// held against the same measurements, where it failed, every explanation that was tried, the
@@ -63,6 +64,9 @@ pub fn improvement_page(
             ));
         }
     }
+    body.push_str(&residual_force(
+        last.and_then(|d| d.residual_force.as_ref()),
+    ));
     body.push_str(&rounds(&improvement.diagnoses));
     if let Some(best) = &improvement.best {
         let all: Vec<_> = best

@@ -25,6 +25,7 @@ mod next;
 mod numbers;
 mod page;
 mod record;
+mod residual_force;
 mod run;
 mod save;
 mod scatter;

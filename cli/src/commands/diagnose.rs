@@ -126,6 +126,9 @@ fn text(diagnosis: &Diagnosis) -> String {
     for advice in &diagnosis.advice {
         text.push_str(&format!("\nadvice: {}: {}", advice.why, advice.experiment));
     }
+    if let Some(force) = &diagnosis.residual_force {
+        text.push_str(&output::residual_force(force));
+    }
     text
 }
 

@@ -116,6 +116,9 @@ fn text(improvement: &Improvement) -> String {
             text.push('\n');
             text.push_str(output::held(last.observer.as_ref()).trim_end());
         }
+        if let Some(force) = &last.residual_force {
+            text.push_str(&output::residual_force(force));
+        }
     }
     if let Some(best) = &improvement.best {
         text.push_str("\n\n");

@@ -1,0 +1,178 @@
+//! Least squares that are judged on blocks of time which they did not see.
+
+use loopsight_core::run::Run;
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::response::Responses;
+
+/// Shortest and longest block, s.
+const BLOCK: (f64, f64) = (0.4, 2.5);
+/// Blocks in all, about.
+const BLOCKS: f64 = 40.0;
+/// Every so many blocks one is left out of a fit.
+const FOLDS: usize = 4;
+
+/// Sums of products by block of time.
+pub(super) struct Blocks {
+    gram: Vec<DMatrix<f64>>,
+    right: Vec<DVector<f64>>,
+    /// Sum of squares of what is to be explained.
+    square: Vec<f64>,
+    /// Number of residuals.
+    rows: f64,
+    /// Weight of staying at zero, as a share of each column's own square.
+    ridge: f64,
+}
+
+/// Block of each sample.
+fn blocks(runs: &[Run]) -> (Vec<usize>, usize) {
+    let duration: f64 = runs.iter().map(Run::duration).sum();
+    let length = (duration / BLOCKS).clamp(BLOCK.0, BLOCK.1);
+    let mut all = Vec::new();
+    let mut first = 0;
+    for run in runs {
+        let mut last = first;
+        for time in &run.time {
+            last = first + ((time - run.time[0]) / length) as usize;
+            all.push(last);
+        }
+        first = last + 1;
+    }
+    (all, first)
+}
+
+impl Blocks {
+    /// Columns of the same meaning, or of no sample where a fit may look, stay near zero: `ridge` is
+    /// the weight of that, as a share of each column's own square.
+    pub(super) fn new(responses: &Responses, runs: &[Run], ridge: f64) -> Self {
+        let (block, n) = blocks(runs);
+        let per_sample = if block.is_empty() {
+            1
+        } else {
+            responses.innovations.len() / block.len()
+        };
+        let mut blocks = Self {
+            gram: Vec::with_capacity(n),
+            right: Vec::with_capacity(n),
+            square: Vec::with_capacity(n),
+            rows: responses.innovations.iter().filter(|v| **v != 0.0).count() as f64,
+            ridge,
+        };
+        let mut from = 0;
+        for part in block.chunk_by(|a, b| a == b) {
+            let rows = part.len() * per_sample;
+            let x = responses.columns.rows(from, rows);
+            let y = responses.innovations.rows(from, rows);
+            let transposed = x.transpose();
+            blocks.gram.push(&transposed * x);
+            blocks.right.push(&transposed * y);
+            blocks.square.push(y.norm_squared());
+            from += rows;
+        }
+        blocks
+    }
+
+    /// Sum of squares of what is to be explained.
+    pub(super) fn total(&self) -> f64 {
+        self.square.iter().sum()
+    }
+
+    /// Best coefficients of `columns` over all blocks but each `fold`-th of the folds, and the
+    /// inverse of their Gram matrix.
+    fn fit(
+        &self,
+        columns: &[usize],
+        without: Option<usize>,
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let n = columns.len();
+        let mut gram: DMatrix<f64> = DMatrix::zeros(n, n);
+        let mut right: DVector<f64> = DVector::zeros(n);
+        for (block, (g, r)) in self.gram.iter().zip(&self.right).enumerate() {
+            if without == Some(block % FOLDS) {
+                continue;
+            }
+            for (i, a) in columns.iter().enumerate() {
+                right[i] += r[*a];
+                for (j, b) in columns.iter().enumerate() {
+                    gram[(i, j)] += g[(*a, *b)];
+                }
+            }
+        }
+        // Columns of one size, as all blocks have it.
+        let scale = DVector::from_fn(n, |i, _| {
+            let of = (columns[i], columns[i]);
+            let square: f64 = self.gram.iter().map(|g| g[of]).sum();
+            if square > 0.0 {
+                square.sqrt().recip()
+            } else {
+                0.0
+            }
+        });
+        let mut scaled = gram;
+        for i in 0..n {
+            for j in 0..n {
+                scaled[(i, j)] *= scale[i] * scale[j];
+            }
+            scaled[(i, i)] += if scale[i] > 0.0 { self.ridge } else { 1.0 };
+        }
+        let inverse = Cholesky::new(scaled)?.inverse();
+        let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        Some((&inverse * right, inverse))
+    }
+
+    /// Best coefficients over all blocks, with standard errors.
+    pub(super) fn solve(&self, columns: &[usize]) -> Option<Vec<(f64, f64)>> {
+        let (coefficients, inverse) = self.fit(columns, None)?;
+        let left: f64 = (0..self.gram.len())
+            .map(|block| self.left(block, columns, &coefficients))
+            .sum();
+        let freedom = (self.rows - columns.len() as f64).max(1.0);
+        let variance = left / freedom;
+        Some(
+            coefficients
+                .iter()
+                .enumerate()
+                .map(|(i, c)| (*c, (variance * inverse[(i, i)]).max(0.0).sqrt()))
+                .collect(),
+        )
+    }
+
+    fn left(&self, block: usize, columns: &[usize], coefficients: &DVector<f64>) -> f64 {
+        let mut left = self.square[block];
+        for (i, a) in columns.iter().zip(coefficients.iter()) {
+            left -= 2.0 * a * self.right[block][*i];
+            for (j, b) in columns.iter().zip(coefficients.iter()) {
+                left += a * b * self.gram[block][(*i, *j)];
+            }
+        }
+        left
+    }
+
+    /// Sum of squares left in each block by coefficients that were found without it.
+    pub(super) fn unseen(&self, columns: &[usize]) -> Vec<f64> {
+        let fits: Vec<_> = (0..FOLDS)
+            .map(|fold| self.fit(columns, Some(fold)))
+            .collect();
+        (0..self.gram.len())
+            .map(|block| match &fits[block % FOLDS] {
+                Some((coefficients, _)) => self.left(block, columns, coefficients),
+                None => self.square[block],
+            })
+            .collect()
+    }
+}
+
+/// By how much the second of two series of losses is less, in all and in standard errors of that
+/// sum.
+pub(super) fn gain(before: &[f64], after: &[f64]) -> (f64, f64) {
+    let n = before.len().min(after.len());
+    let differences: Vec<f64> = before.iter().zip(after).map(|(a, b)| a - b).collect();
+    let sum: f64 = differences.iter().sum();
+    if n < 2 {
+        return (sum, 0.0);
+    }
+    let mean = sum / n as f64;
+    let squares: f64 = differences.iter().map(|d| (d - mean).powi(2)).sum();
+    let error = (squares * n as f64 / (n - 1) as f64).sqrt();
+    (sum, if error > 0.0 { sum / error } else { 0.0 })
+}

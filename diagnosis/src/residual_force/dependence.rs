@@ -1,0 +1,252 @@
+//! What a force depends on: its mean over each quantity, and how much of it that is.
+
+use std::f64::consts::TAU;
+
+use loopsight_core::Role;
+use loopsight_core::model::Model;
+use loopsight_core::run::Run;
+use serde::Serialize;
+
+use super::blocks::Blocks;
+use super::filter::Filtered;
+use super::place::{Group, Law};
+use super::response::{Column, Responses, responses};
+use super::shape::Variable;
+use crate::problem::Solution;
+
+/// Bins of a quantity.
+const BINS: usize = 16;
+/// Bins with fewer samples say nothing.
+const FEWEST: usize = 15;
+/// Share of the samples beyond either end of the bins.
+const TAIL: f64 = 0.01;
+
+/// Weight of a mean of zero, as a share of what all samples of a bin say.
+const RIDGE: f64 = 1e-3;
+
+/// How a force depends on one quantity.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Dependence {
+    /// The quantity, by its name in an expression.
+    pub quantity: String,
+    /// Its unit.
+    pub unit: String,
+    /// Where the quantity is an angle that makes turns: one turn, to which it is reduced.
+    pub period: Option<f64>,
+    /// Share of the force's variance that its mean over the quantity accounts for, on blocks of time
+    /// that the mean was not taken from: chance gives nothing.
+    pub share_of_variance: f64,
+    /// The mean force over the quantity: one curve for either direction of motion, or one for all.
+    pub curves: Vec<Curve>,
+}
+
+/// A mean force over a quantity.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Curve {
+    /// `forwards`, `backwards`, or `all`.
+    pub direction: &'static str,
+    /// In the order of the quantity.
+    pub bins: Vec<Bin>,
+}
+
+/// A stretch of a quantity.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bin {
+    /// Mean of the quantity.
+    pub center: f64,
+    /// Mean force.
+    pub mean: f64,
+    /// Standard error of the mean.
+    pub std_error: f64,
+    /// Number of samples.
+    pub count: usize,
+    /// Mean of the expression over the same samples.
+    pub expression: Option<f64>,
+}
+
+/// The model held to the measurements, as the responses need it.
+pub(super) struct Held<'a> {
+    pub(super) model: &'a Model,
+    pub(super) solution: &'a Solution,
+    pub(super) runs: &'a [Run],
+    pub(super) filtered: &'a [Filtered],
+    /// White innovations that a force should explain, and the squares that noise makes of them.
+    pub(super) innovations: &'a nalgebra::DVector<f64>,
+    pub(super) noise: f64,
+}
+
+/// Samples of some channels, by bin.
+struct Sorted {
+    /// By channel and sample, the bin.
+    bin: Vec<Vec<Option<usize>>>,
+    center: Vec<f64>,
+    count: Vec<usize>,
+}
+
+/// How the force at the channels `at` of `group` depends on each quantity there, the most telling
+/// first.
+pub(super) fn dependences(
+    held: &Held<'_>,
+    group: &Group,
+    at: &[usize],
+    laws: &[Law],
+) -> Vec<Dependence> {
+    let mut all: Vec<Dependence> = (0..group.quantities.len())
+        .filter_map(|q| dependence(held, group, at, laws, q))
+        .collect();
+    all.sort_by(|a, b| b.share_of_variance.total_cmp(&a.share_of_variance));
+    all
+}
+
+fn dependence(
+    held: &Held<'_>,
+    group: &Group,
+    at: &[usize],
+    laws: &[Law],
+    quantity: usize,
+) -> Option<Dependence> {
+    let of = &group.quantities[quantity];
+    let flow = group
+        .quantities
+        .iter()
+        .position(|q| q.variable == Variable::Role(Role::Flow))
+        .filter(|flow| *flow != quantity);
+    let directions: &[(&'static str, f64)] = match flow {
+        Some(_) => &[("forwards", 1.0), ("backwards", -1.0)],
+        None => &[("all", 0.0)],
+    };
+    let mut columns = Vec::new();
+    let mut sorted = Vec::new();
+    for (_, sign) in directions {
+        let goes =
+            |c: usize, k: usize| flow.is_none_or(|flow| group.series[c][flow][k] * sign > 0.0);
+        let part = sort(group, at, quantity, &goes)?;
+        for bin in 0..part.center.len() {
+            let forces = at
+                .iter()
+                .zip(&part.bin)
+                .map(|(c, bins)| {
+                    let inside = bins.iter().map(|b| f64::from(u8::from(*b == Some(bin))));
+                    (group.channels[*c].place, inside.collect())
+                })
+                .collect();
+            columns.push(Column::Force(forces));
+        }
+        sorted.push(part);
+    }
+    let Responses { columns: found, .. } = responses(
+        held.model,
+        held.solution,
+        held.runs,
+        held.filtered,
+        &columns,
+    );
+    let blocks = Blocks::new(
+        &Responses {
+            innovations: held.innovations.clone(),
+            columns: found,
+        },
+        held.runs,
+        RIDGE,
+    );
+    let every: Vec<usize> = (0..columns.len()).collect();
+    let means = blocks.solve(&every)?;
+    let left: f64 = blocks.unseen(&every).iter().sum();
+    let share = (blocks.total() - left) / (blocks.total() - held.noise);
+    let mut means = means.into_iter();
+    let curves = directions
+        .iter()
+        .zip(&sorted)
+        .map(|((direction, _), part)| Curve {
+            direction,
+            bins: (0..part.center.len())
+                .filter_map(|bin| {
+                    let (mean, std_error) = means.next()?;
+                    (part.count[bin] >= FEWEST).then(|| Bin {
+                        center: part.center[bin],
+                        mean,
+                        std_error,
+                        count: part.count[bin],
+                        expression: (!laws.is_empty()).then(|| of_laws(group, at, laws, part, bin)),
+                    })
+                })
+                .collect(),
+        })
+        .filter(|curve| !curve.bins.is_empty())
+        .collect();
+    Some(Dependence {
+        quantity: of.variable.name().to_owned(),
+        unit: of.unit.clone(),
+        period: of.turns.then_some(TAU),
+        share_of_variance: share.clamp(0.0, 1.0),
+        curves,
+    })
+}
+
+/// Sorts the samples of the channels `at` into bins of equal width; `None` where all are alike.
+fn sort(
+    group: &Group,
+    at: &[usize],
+    quantity: usize,
+    goes: &dyn Fn(usize, usize) -> bool,
+) -> Option<Sorted> {
+    let of = &group.quantities[quantity];
+    let value = |c: usize, k: usize| {
+        let x = group.series[c][quantity][k];
+        if of.turns { x.rem_euclid(TAU) } else { x }
+    };
+    let mut values: Vec<f64> = at
+        .iter()
+        .flat_map(|c| (0..group.samples()).map(move |k| (*c, k)))
+        .map(|(c, k)| value(c, k))
+        .collect();
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    let (low, high) = if of.turns {
+        (0.0, TAU)
+    } else {
+        let quantile = |share: f64| values[(share * last as f64).round() as usize];
+        (quantile(TAIL), quantile(1.0 - TAIL))
+    };
+    if high <= low || !(high - low).is_finite() {
+        return None;
+    }
+    let mut sorted = Sorted {
+        bin: Vec::new(),
+        center: vec![0.0; BINS],
+        count: vec![0; BINS],
+    };
+    for c in at {
+        let bins = (0..group.samples())
+            .map(|k| {
+                if !goes(*c, k) {
+                    return None;
+                }
+                let x = value(*c, k);
+                let bin = ((x - low) / (high - low) * BINS as f64).floor();
+                let bin = bin.clamp(0.0, (BINS - 1) as f64) as usize;
+                sorted.center[bin] += x;
+                sorted.count[bin] += 1;
+                Some(bin)
+            })
+            .collect();
+        sorted.bin.push(bins);
+    }
+    for (center, count) in sorted.center.iter_mut().zip(&sorted.count) {
+        *center /= (*count).max(1) as f64;
+    }
+    Some(sorted)
+}
+
+/// The mean of `laws` over the samples of a bin.
+fn of_laws(group: &Group, at: &[usize], laws: &[Law], sorted: &Sorted, bin: usize) -> f64 {
+    let mut sum = 0.0;
+    for (c, bins) in at.iter().zip(&sorted.bin) {
+        for (k, of) in bins.iter().enumerate() {
+            if *of == Some(bin) {
+                sum += group.force(laws, *c, k);
+            }
+        }
+    }
+    sum / sorted.count[bin].max(1) as f64
+}

@@ -1,0 +1,313 @@
+//! The model held to the measurements, sample by sample.
+
+use loopsight_core::model::{Model, pseudo_inverse};
+use loopsight_core::run::Run;
+use loopsight_core::sensor::Sensor;
+use loopsight_core::simulate::Simulator;
+use loopsight_core::{DUAL_WIDTH, Dual, Place, Real, derivative, variable};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::floor::noise;
+use crate::problem::Solution;
+
+/// Sizes of the unknown force that are tried, in the size of the channels.
+const SIZES: [f64; 6] = [0.02, 0.1, 0.4, 1.2, 3.5, 10.0];
+/// Least noise of a sensor, as a share of the signal's standard deviation: no sensor is perfect.
+const LEAST_NOISE: f64 = 1e-4;
+/// How much less certain an initial state is than the sensors make it.
+const INITIAL: f64 = 4.0;
+
+/// A run through the filter.
+pub(super) struct Filtered {
+    /// Correction by what the measurement says beyond the prediction, by sample: of the plant's
+    /// state, then of the rounding of the counts.
+    pub(super) gains: Vec<DMatrix<f64>>,
+    /// What makes the innovations of a sample white, by sample.
+    pub(super) whiteners: Vec<DMatrix<f64>>,
+    /// White innovations, sample by sample, signal by signal.
+    pub(super) innovations: Vec<f64>,
+    /// All signals of the plant in the middle of the interval that ends with each sample.
+    pub(super) signals: Vec<Vec<f64>>,
+    /// Squares of the innovations that the noise of the sensors alone would make.
+    pub(super) noise: f64,
+    likelihood: f64,
+}
+
+impl Filtered {
+    /// A sample that is not looked at.
+    fn pass(&mut self, nx: usize, ny: usize, signals: Vec<f64>) {
+        self.gains.push(DMatrix::zeros(nx + ny, ny));
+        self.whiteners.push(DMatrix::zeros(ny, ny));
+        self.innovations.extend(std::iter::repeat_n(0.0, ny));
+        self.signals.push(signals);
+    }
+}
+
+/// An extended Kalman filter whose unknown is a force: between two samples each effort (where the
+/// plant has none, each input) is off by a constant, of a size that is found by maximum likelihood.
+/// Returns one filtered run per run.
+///
+/// ```text
+/// [x; y]⁻ = F(x) ≈ A x + B w      P⁻ = A P Aᵀ + B Q Bᵀ      S = P⁻_yy + R
+/// x⁺ = x⁻ + K (y - y⁻)            K = P⁻_xy S⁻¹              P⁺ = P⁻_xx - K S Kᵀ
+/// ```
+///
+/// `y⁻` is what the sensors would read, which for a mean depends on the whole interval. What was
+/// rounded off a count comes back in the next difference, so the state has it, too. Effects keep
+/// their own states and memories. `A` and `B` are those of the plant alone: they decide about
+/// the gain only, and a gain need not be perfect.
+///
+/// Reference: A. H. Jazwinski (1970), "Stochastic Processes and Filtering Theory", section 8.3;
+/// the likelihood is that of the innovations, F. C. Schweppe (1965), IEEE Trans. Information Theory
+/// 11, 61–70.
+pub(super) fn filter(model: &Model, solution: &Solution, runs: &[Run]) -> Vec<Filtered> {
+    let tried: Vec<Vec<Filtered>> = SIZES
+        .par_iter()
+        .map(|size| {
+            runs.iter()
+                .zip(&solution.states)
+                .map(|(run, x0)| filtered(model, &solution.values, run, x0, *size))
+                .collect()
+        })
+        .collect();
+    tried
+        .into_iter()
+        .max_by(|a, b| {
+            let sum = |of: &Vec<Filtered>| of.iter().map(|f| f.likelihood).sum::<f64>();
+            sum(a).total_cmp(&sum(b))
+        })
+        .unwrap_or_default()
+}
+
+/// Places of the unknown force, with their sizes.
+fn unknowns(model: &Model) -> Vec<(Place, f64)> {
+    let of = |effort: bool| {
+        model
+            .plant
+            .channels
+            .iter()
+            .filter(move |c| match c.place {
+                Place::Effort(_) => effort,
+                Place::Input(_) => !effort,
+                _ => false,
+            })
+            .map(|c| (c.place, c.size))
+            .collect::<Vec<_>>()
+    };
+    let efforts = of(true);
+    if efforts.is_empty() {
+        of(false)
+    } else {
+        efforts
+    }
+}
+
+/// The plant's step from a corrected state, with derivatives by the state and the unknowns.
+struct Linear<'m> {
+    places: Vec<Place>,
+    simulators: Vec<Simulator<'m, Dual>>,
+    measured: usize,
+}
+
+impl<'m> Linear<'m> {
+    fn new(bare: &'m Model, values: &[f64], places: Vec<Place>, x0: &[f64], input: &[f64]) -> Self {
+        let dual = |from: &[f64]| from.iter().map(|v| Dual::of(*v)).collect::<Vec<_>>();
+        let columns = x0.len() + places.len();
+        let simulators = (0..columns.div_ceil(DUAL_WIDTH))
+            .map(|_| {
+                let mut simulator = Simulator::new(bare, &dual(values));
+                simulator.reset(&dual(x0), input);
+                simulator
+            })
+            .collect();
+        Self {
+            places,
+            simulators,
+            measured: bare.measured.len(),
+        }
+    }
+
+    /// `[A B]`, rows: states, then measured signals.
+    fn step(&mut self, x: &[f64], until: f64, input: &[f64]) -> DMatrix<f64> {
+        let nx = x.len();
+        let columns = nx + self.places.len();
+        let mut jacobian = DMatrix::zeros(nx + self.measured, columns);
+        let mut outputs = vec![Dual::of(0.0); self.measured];
+        for (batch, simulator) in self.simulators.iter_mut().enumerate() {
+            let first = batch * DUAL_WIDTH;
+            let last = (first + DUAL_WIDTH).min(columns);
+            let seed = |value: f64, column: usize| {
+                if (first..last).contains(&column) {
+                    variable(value, column - first)
+                } else {
+                    Dual::of(value)
+                }
+            };
+            for (i, (to, value)) in simulator.state_mut().iter_mut().zip(x).enumerate() {
+                *to = seed(*value, i);
+            }
+            for (i, place) in self.places.iter().enumerate() {
+                simulator.push(*place, seed(0.0, nx + i));
+            }
+            simulator.advance(until, input);
+            simulator.measure(&mut outputs);
+            for column in first..last {
+                for (row, value) in simulator.state().iter().chain(&outputs).enumerate() {
+                    jacobian[(row, column)] = derivative(value, column - first);
+                }
+            }
+        }
+        jacobian
+    }
+}
+
+/// Variances of the sensors' noise, and of what is rounded off at a sample: that noise comes back,
+/// with the opposite sign, in the next difference of counts.
+fn sensors(model: &Model, run: &Run) -> (DVector<f64>, DVector<f64>) {
+    let n = model.measured.len();
+    let mut white = DVector::zeros(n);
+    let mut rounding = DVector::zeros(n);
+    for (i, measured) in model.measured.iter().enumerate() {
+        let (noise, std) = noise(&measured.sensor, i, std::slice::from_ref(run));
+        let least = (LEAST_NOISE * std).max(f64::MIN_POSITIVE.sqrt()).powi(2);
+        if matches!(measured.sensor, Sensor::EncoderCounts(_)) {
+            white[i] = least;
+            rounding[i] = 0.5 * noise.powi(2);
+        } else {
+            white[i] = noise.powi(2).max(least);
+        }
+    }
+    (white, rounding)
+}
+
+/// What is measured at a sample, beyond what is `predicted`; zero where nothing is.
+pub(super) fn innovation<S: Real>(sample: &[f64], predicted: &[S], rounded: &[S], to: &mut [S]) {
+    for (i, to) in to.iter_mut().enumerate() {
+        *to = if sample[i].is_finite() && predicted[i].value().is_finite() {
+            S::of(sample[i]) - predicted[i] + rounded[i]
+        } else {
+            S::zero()
+        };
+    }
+}
+
+fn filtered(model: &Model, values: &[f64], run: &Run, x0: &DVector<f64>, size: f64) -> Filtered {
+    let (nx, ny, n_signals) = (model.n_states(), model.measured.len(), model.n_signals());
+    let mut out = Filtered {
+        gains: Vec::new(),
+        whiteners: Vec::new(),
+        innovations: Vec::new(),
+        signals: Vec::new(),
+        noise: 0.0,
+        likelihood: 0.0,
+    };
+    if run.is_empty() {
+        return out;
+    }
+    let mut bare = model.clone();
+    bare.effects.clear();
+    let unknown = unknowns(model);
+    let q = DMatrix::from_diagonal(&DVector::from_iterator(
+        unknown.len(),
+        unknown.iter().map(|(_, s)| (s * size).powi(2)),
+    ));
+    let places = unknown.iter().map(|(place, _)| *place).collect();
+    let mut linear = Linear::new(&bare, values, places, x0.as_slice(), run.input(0));
+    let (white, rounding) = sensors(model, run);
+    let nz = nx + ny;
+    // Noise of a sample: rounding as a state, and all of it in what is measured.
+    let mut sensing = DMatrix::zeros(nz + ny, nz + ny);
+    for i in 0..ny {
+        sensing[(nx + i, nx + i)] = rounding[i];
+        sensing[(nx + i, nz + i)] = rounding[i];
+        sensing[(nz + i, nx + i)] = rounding[i];
+        sensing[(nz + i, nz + i)] = white[i] + rounding[i];
+    }
+    let (h, _) = model.measurement_jacobian(values, x0.as_slice());
+    let back = pseudo_inverse(&h).unwrap_or_else(|| DMatrix::zeros(nx, ny));
+    let initial = DMatrix::from_diagonal(&(&white + &rounding * 2.0));
+    let mut p = DMatrix::zeros(nz, nz);
+    p.view_mut((0, 0), (nx, nx))
+        .copy_from(&(&back * initial * back.transpose() * INITIAL));
+    p.view_mut((nx, nx), (ny, ny))
+        .copy_from(&DMatrix::from_diagonal(&rounding));
+    // The same, were the noise of the sensors all there is.
+    let mut noisy = p.clone();
+    let mut simulator = Simulator::new(model, values);
+    simulator.reset(x0.as_slice(), run.input(0));
+    out.pass(nx, ny, simulator.signals().to_vec());
+    let mut outputs = vec![0.0; ny];
+    let mut rounded = vec![0.0; ny];
+    let mut beyond = DVector::zeros(ny);
+    for k in 1..run.len() {
+        let until = run.time[k] - run.time[0];
+        let before: Vec<f64> = simulator.signals().to_vec();
+        let ab = linear.step(simulator.state(), until, run.input(k - 1));
+        simulator.advance(until, run.input(k - 1));
+        simulator.measure(&mut outputs);
+        // Before the measurement corrects it: what a force is said to depend on must not know the
+        // residual that it is to explain.
+        let mut middle: Vec<f64> = simulator
+            .signals()
+            .iter()
+            .zip(&before)
+            .map(|(a, b)| 0.5 * (a + b))
+            .collect();
+        middle[nx..nx + run.n_inputs].copy_from_slice(run.input(k - 1));
+        innovation(run.sample(k), &outputs, &rounded, beyond.as_mut_slice());
+
+        let mut a = DMatrix::zeros(nz + ny, nz);
+        let mut b = DMatrix::zeros(nz + ny, q.ncols());
+        a.view_mut((0, 0), (nx, nx))
+            .copy_from(&ab.view((0, 0), (nx, nx)));
+        b.view_mut((0, 0), (nx, q.ncols()))
+            .copy_from(&ab.view((0, nx), (nx, q.ncols())));
+        for i in 0..ny {
+            // Nothing is learnt from a sample that is not there.
+            if run.sample(k)[i].is_finite() {
+                a.view_mut((nz + i, 0), (1, nx))
+                    .copy_from(&ab.view((nx + i, 0), (1, nx)));
+                a[(nz + i, nx + i)] = -1.0;
+                b.row_mut(nz + i)
+                    .copy_from(&ab.view((nx + i, nx), (1, q.ncols())).row(0));
+            }
+        }
+        let joint = &a * &p * a.transpose() + &b * &q * b.transpose() + &sensing;
+        let s = joint.view((nz, nz), (ny, ny)).clone_owned();
+        let Some(cholesky) = Cholesky::new(s.clone()) else {
+            break;
+        };
+        let gain = joint.view((0, nz), (nz, ny)) * cholesky.inverse();
+        p = joint.view((0, 0), (nz, nz)) - &gain * &s * gain.transpose();
+        let lower = cholesky.l();
+        let whitener = lower
+            .solve_lower_triangular(&DMatrix::identity(ny, ny))
+            .unwrap_or_else(|| DMatrix::zeros(ny, ny));
+        let joint = &a * &noisy * a.transpose() + &sensing;
+        let s = joint.view((nz, nz), (ny, ny));
+        let crossed = joint.view((0, nz), (nz, ny)) * gain.transpose();
+        out.noise += (&whitener * s * whitener.transpose()).trace();
+        noisy = joint.view((0, 0), (nz, nz)) + &gain * s * gain.transpose()
+            - &crossed
+            - crossed.transpose();
+
+        let white = &whitener * &beyond;
+        out.likelihood -= 0.5 * white.norm_squared();
+        out.likelihood -= lower.diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        let correction = &gain * &beyond;
+        for (x, add) in simulator.state_mut().iter_mut().zip(correction.iter()) {
+            *x += add;
+        }
+        rounded.copy_from_slice(&correction.as_slice()[nx..]);
+        out.gains.push(gain);
+        out.whiteners.push(whitener);
+        out.innovations.extend(white.iter());
+        out.signals.push(middle);
+    }
+    // What the filter did not get to counts nothing.
+    for _ in out.gains.len()..run.len() {
+        out.pass(nx, ny, vec![0.0; n_signals]);
+    }
+    out
+}

@@ -1,0 +1,221 @@
+//! The force that is missing where no effect of the library is it: what it depends on, and an
+//! expression to begin with.
+
+mod blocks;
+mod dependence;
+mod filter;
+mod place;
+mod response;
+mod select;
+mod shape;
+mod words;
+
+use loopsight_core::model::Model;
+use loopsight_core::run::Run;
+use nalgebra::DVector;
+use serde::Serialize;
+
+pub use dependence::{Bin, Curve, Dependence};
+
+use crate::prediction::InitialStates;
+use crate::problem::Solution;
+use blocks::Blocks;
+use dependence::{Held, dependences};
+use filter::filter;
+use place::{Group, Way, groups};
+use response::{Column, responses};
+use select::{Chosen, select};
+use words::{statement, written};
+
+/// Most samples that are looked at: what a force depends on shows in fewer.
+const MOST_SAMPLES: usize = 30_000;
+/// Weight of a coefficient of zero, as a share of what the samples say: enough for terms that the
+/// parameters can be.
+const RIDGE: f64 = 1e-7;
+/// The squares of the innovations must exceed those of noise by so many standard deviations.
+const SEEN: f64 = 5.0;
+/// A coefficient must be so many standard errors from zero to be written down.
+const SURE: f64 = 3.0;
+/// Of places that explain as much as this share of the best, the simplest is taken.
+const AS_GOOD: f64 = 0.97;
+
+/// A force that would make the model agree with the measurements.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ResidualForce {
+    /// Channels it acts at.
+    pub at: Vec<String>,
+    /// Its unit.
+    pub unit: String,
+    /// What it depends on, in words.
+    pub statement: String,
+    /// Quantities it depends on, the most telling first.
+    pub depends_on: Vec<Dependence>,
+    /// An expression to begin with; `null` where none stands out from the noise.
+    pub expression: Option<Expression>,
+}
+
+/// A force as an expression, to be edited.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Expression {
+    /// The expression with its numbers.
+    pub force: String,
+    /// Share of the residual force's variance that it accounts for, on blocks of time that its
+    /// numbers were not found from.
+    pub share_of_variance: f64,
+    /// `[[effect]]` entries for the model file.
+    pub toml: String,
+}
+
+/// What force is missing from the fitted `model`.
+///
+/// The model follows the measurements through a filter whose only unknown is a force; what the
+/// measurements say beyond the prediction, sample by sample, is then held against what each of many
+/// forces would do there, known parameters free to bend. That is a linear regression of white
+/// residuals on exact derivatives, in the units of the forces: no measurement is differentiated, and
+/// nothing has to be known at an instant. Terms and shares are judged on blocks of time that no
+/// coefficient was found from, so that chance gives nothing.
+///
+/// `None` where the plant offers no place for a force, or noise explains what there is.
+pub fn residual_force(model: &Model, runs: &[Run]) -> Option<ResidualForce> {
+    let values = model.values();
+    let states = InitialStates::estimate(model, &values, runs).states;
+    of_solution(model, &Solution { values, states }, runs)
+}
+
+/// As [`residual_force`], from known initial states.
+pub(crate) fn of_solution(
+    model: &Model,
+    solution: &Solution,
+    runs: &[Run],
+) -> Option<ResidualForce> {
+    let runs = &shortened(runs);
+    let filtered = filter(model, solution, runs);
+    let noise: f64 = filtered.iter().map(|f| f.noise).sum();
+    let parameters: Vec<usize> = (0..model.parameters.len())
+        .filter(|i| model.parameters[*i].free)
+        .collect();
+    let known: Vec<usize> = (0..parameters.len()).collect();
+    let bend: Vec<Column> = parameters.iter().map(|i| Column::Parameter(*i)).collect();
+    let bent = responses(model, solution, runs, &filtered, &bend);
+
+    let spread = noise * (2.0 / bent.innovations.len().max(1) as f64).sqrt();
+    let plain: f64 = Blocks::new(&bent, runs, RIDGE).unseen(&known).iter().sum();
+    if plain - noise < SEEN * spread {
+        return None;
+    }
+
+    let mut best: Option<Found> = None;
+    for group in groups(model, runs, &filtered) {
+        let forces = responses(model, solution, runs, &filtered, &group.columns());
+        let blocks = Blocks::new(&group.joined(&bent, &forces), runs, RIDGE);
+        for way in group.ways.clone() {
+            let choices = group.choices(way, known.len());
+            let chosen = select(&blocks, &known, &choices, noise);
+            let better = best.as_ref().is_none_or(|best| {
+                let other = &best.chosen;
+                if chosen.complexity < other.complexity {
+                    chosen.explained > AS_GOOD * other.explained
+                } else {
+                    other.explained < AS_GOOD * chosen.explained
+                }
+            });
+            if !better {
+                continue;
+            }
+            let of_terms = chosen.terms.iter().flat_map(|t| &choices[*t].columns);
+            let columns: Vec<usize> = known.iter().chain(of_terms).copied().collect();
+            let numbers = sure(&blocks, known.len(), columns.clone())?;
+            best = Some(Found {
+                left: blocks.unseen(&columns).iter().sum(),
+                group: group.clone(),
+                way,
+                chosen,
+                numbers,
+            });
+        }
+    }
+    let found = best?;
+    let (bending, numbers) = found.numbers.split_at(known.len());
+    // The force that is missing is the one that the known part leaves when it is at its best.
+    let mut innovations = bent.innovations.clone();
+    if !numbers.is_empty() {
+        innovations -= &bent.columns * DVector::from_column_slice(bending);
+    }
+    let explainable = innovations.norm_squared() - noise;
+    let laws = match found.chosen.terms.as_slice() {
+        [] => Vec::new(),
+        terms => found.group.laws(found.way, terms, numbers),
+    };
+    let at = found.group.at(found.way);
+    let held = Held {
+        model,
+        solution,
+        runs,
+        filtered: &filtered,
+        innovations: &innovations,
+        noise,
+    };
+    let depends_on = dependences(&held, &found.group, &at, &laws);
+    let share = (1.0 - (found.left - noise) / explainable).clamp(0.0, 1.0);
+    let names: Vec<String> = at
+        .iter()
+        .map(|c| found.group.channels[*c].id.to_owned())
+        .collect();
+    let expression = (!laws.is_empty()).then(|| {
+        let (toml, force) = written(&found.group, &laws);
+        Expression {
+            force,
+            share_of_variance: share,
+            toml,
+        }
+    });
+    Some(ResidualForce {
+        statement: statement(
+            &names,
+            &depends_on,
+            expression.as_ref().map(|_| (&laws[..], share)),
+        ),
+        unit: found.group.channels[at[0]].unit.to_owned(),
+        at: names,
+        depends_on,
+        expression,
+    })
+}
+
+/// The coefficients of `columns`; zero for what is no more than noise, as one half of a wave may be,
+/// but for the first `known`.
+fn sure(blocks: &Blocks, known: usize, columns: Vec<usize>) -> Option<Vec<f64>> {
+    let all = blocks.solve(&columns)?;
+    let stays: Vec<usize> = (0..columns.len())
+        .filter(|i| *i < known || all[*i].0.abs() > SURE * all[*i].1)
+        .collect();
+    let kept: Vec<usize> = stays.iter().map(|i| columns[*i]).collect();
+    let mut numbers = vec![0.0; columns.len()];
+    for (i, (number, _)) in stays.iter().zip(blocks.solve(&kept)?) {
+        numbers[*i] = number;
+    }
+    Some(numbers)
+}
+
+/// The best way so far in which forces could act.
+struct Found {
+    group: Group,
+    way: Way,
+    chosen: Chosen,
+    /// Of the known parameters, by how much they bend; then those of the terms.
+    numbers: Vec<f64>,
+    /// Sum of squares left on blocks that the numbers were not found from.
+    left: f64,
+}
+
+/// The first runs, up to so many samples that they tell enough.
+fn shortened(runs: &[Run]) -> Vec<Run> {
+    let mut left = MOST_SAMPLES;
+    let mut all = Vec::new();
+    for run in runs {
+        let n = run.len().min(left);
+        left -= n;
+        all.push(run.part(0..n));
+    }
+    all
+}

@@ -1,0 +1,90 @@
+//! A few terms that explain a force, chosen one after the other.
+
+use super::blocks::{Blocks, gain};
+
+/// A term must be so many standard errors better on blocks that it was not fitted to: there are
+/// hundreds to choose from.
+const CERTAIN: f64 = 4.0;
+/// And account for so much of what noise does not explain.
+const WORTH: f64 = 0.03;
+/// Most terms.
+const MOST: usize = 4;
+/// Of terms that are as good as this share of the best, the simplest is taken.
+const AS_GOOD: f64 = 0.97;
+
+/// A term that may be chosen.
+#[derive(Clone, Debug)]
+pub(super) struct Choice {
+    /// Its columns.
+    pub(super) columns: Vec<usize>,
+    /// How intricate it is.
+    pub(super) complexity: usize,
+}
+
+/// What was chosen.
+#[derive(Clone, Debug)]
+pub(super) struct Chosen {
+    /// Indices among the choices.
+    pub(super) terms: Vec<usize>,
+    /// Sum of squares that they take off blocks they were not fitted to, beyond what the known
+    /// parameters can.
+    pub(super) explained: f64,
+    /// How intricate they are together.
+    pub(super) complexity: usize,
+}
+
+/// Chooses terms for as long as one more pays on unseen blocks, then drops those that later ones
+/// made needless. The columns `known` may always bend: they are the model's own parameters.
+pub(super) fn select(blocks: &Blocks, known: &[usize], choices: &[Choice], noise: f64) -> Chosen {
+    let columns = |terms: &[usize]| -> Vec<usize> {
+        let chosen = terms
+            .iter()
+            .flat_map(|t| choices[*t].columns.iter().copied());
+        known.iter().copied().chain(chosen).collect()
+    };
+    let plain = blocks.unseen(known);
+    let base: f64 = plain.iter().sum();
+    // White residuals: a coefficient's square in standard errors is what it takes off.
+    let worth = (WORTH * (base - noise)).max(CERTAIN * CERTAIN);
+    let mut terms: Vec<usize> = Vec::new();
+    let mut losses = plain.clone();
+    while terms.len() < MOST {
+        let tried: Vec<(usize, f64, f64)> = (0..choices.len())
+            .filter(|t| !terms.contains(t))
+            .map(|t| {
+                let with: Vec<usize> = terms.iter().copied().chain([t]).collect();
+                let (sum, errors) = gain(&losses, &blocks.unseen(&columns(&with)));
+                (t, sum, errors)
+            })
+            .filter(|(_, sum, errors)| *sum > worth && *errors > CERTAIN)
+            .collect();
+        let best = tried.iter().map(|t| t.1).fold(0.0, f64::max);
+        let simplest = tried
+            .iter()
+            .filter(|t| t.1 >= AS_GOOD * best)
+            .min_by_key(|t| choices[t.0].complexity);
+        let Some((term, ..)) = simplest else {
+            break;
+        };
+        terms.push(*term);
+        losses = blocks.unseen(&columns(&terms));
+    }
+    let mut at = 0;
+    while at + 1 < terms.len() {
+        let mut without = terms.clone();
+        without.remove(at);
+        let fewer = blocks.unseen(&columns(&without));
+        let (sum, errors) = gain(&fewer, &losses);
+        if sum > worth && errors > CERTAIN {
+            at += 1;
+        } else {
+            terms = without;
+            losses = fewer;
+        }
+    }
+    Chosen {
+        explained: base - losses.iter().sum::<f64>(),
+        complexity: terms.iter().map(|t| choices[*t].complexity).sum(),
+        terms,
+    }
+}

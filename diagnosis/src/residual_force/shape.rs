@@ -1,0 +1,242 @@
+//! The terms that a residual force may be made of.
+
+use std::f64::consts::TAU;
+
+use loopsight_core::Role;
+
+/// What a term may depend on, at a channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Variable {
+    /// A signal of the plant in a role.
+    Role(Role),
+    /// Time since the start of the run.
+    Time,
+}
+
+/// One thing to multiply a coefficient with.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Shape {
+    One,
+    Is(Variable),
+    Magnitude(Variable),
+    /// `x²`, `x³`.
+    Power(Variable, i32),
+    /// `x |x|`.
+    SignedSquare(Variable),
+    /// `tanh(x/s)`.
+    Direction(Variable, f64),
+    /// `max(x, 0)` and `min(x, 0)`.
+    Positive(Variable),
+    Negative(Variable),
+    /// Of a number of waves per revolution.
+    Cosine(Variable, u32),
+    Sine(Variable, u32),
+    Product(Box<Shape>, Box<Shape>),
+}
+
+/// A role's name in an expression.
+const fn word(role: Role) -> &'static str {
+    match role {
+        Role::Flow => "flow",
+        Role::Position => "position",
+        Role::Drive => "drive",
+        Role::Heading => "heading",
+        Role::Forward => "forward",
+        Role::Yaw => "yaw",
+        Role::Load => "load",
+        Role::Armature => "armature",
+        Role::Centrifugal => "centrifugal",
+        Role::Shaft => "shaft",
+    }
+}
+
+impl Variable {
+    /// Name in an expression.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Variable::Role(role) => word(role),
+            Variable::Time => "time",
+        }
+    }
+}
+
+impl Shape {
+    pub(super) fn times(&self, other: &Shape) -> Shape {
+        match (self, other) {
+            (Shape::One, x) | (x, Shape::One) => x.clone(),
+            (a, b) => Shape::Product(Box::new(a.clone()), Box::new(b.clone())),
+        }
+    }
+
+    /// Its value, where `of` gives the variables'.
+    pub(super) fn value(&self, of: &dyn Fn(Variable) -> f64) -> f64 {
+        match self {
+            Shape::One => 1.0,
+            Shape::Is(x) => of(*x),
+            Shape::Magnitude(x) => of(*x).abs(),
+            Shape::Power(x, n) => of(*x).powi(*n),
+            Shape::SignedSquare(x) => of(*x) * of(*x).abs(),
+            Shape::Direction(x, scale) => (of(*x) / scale).tanh(),
+            Shape::Positive(x) => of(*x).max(0.0),
+            Shape::Negative(x) => of(*x).min(0.0),
+            Shape::Cosine(x, n) => (f64::from(*n) * of(*x)).cos(),
+            Shape::Sine(x, n) => (f64::from(*n) * of(*x)).sin(),
+            Shape::Product(a, b) => a.value(of) * b.value(of),
+        }
+    }
+
+    /// As it stands in an expression; `scale` names the scale of a [`Shape::Direction`].
+    pub(super) fn text(&self, scale: &mut dyn FnMut(Variable, f64) -> String) -> String {
+        let wave = |function: &str, x: &Variable, n: u32| match n {
+            1 => format!("{function}({})", x.name()),
+            _ => format!("{function}({n} * {})", x.name()),
+        };
+        match self {
+            Shape::One => "1".to_owned(),
+            Shape::Is(x) => x.name().to_owned(),
+            Shape::Magnitude(x) => format!("abs({})", x.name()),
+            Shape::Power(x, n) => format!("{}^{n}", x.name()),
+            Shape::SignedSquare(x) => format!("{0} * abs({0})", x.name()),
+            Shape::Direction(x, s) => format!("tanh({} / {})", x.name(), scale(*x, *s)),
+            Shape::Positive(x) => format!("max({}, 0)", x.name()),
+            Shape::Negative(x) => format!("min({}, 0)", x.name()),
+            Shape::Cosine(x, n) => wave("cos", x, *n),
+            Shape::Sine(x, n) => wave("sin", x, *n),
+            Shape::Product(a, b) => format!("{} * {}", a.text(scale), b.text(scale)),
+        }
+    }
+
+    /// How many times each variable multiplies the unit.
+    pub(super) fn powers(&self) -> Vec<(Variable, i32)> {
+        match self {
+            Shape::One | Shape::Direction(..) | Shape::Cosine(..) | Shape::Sine(..) => Vec::new(),
+            Shape::Is(x) | Shape::Magnitude(x) | Shape::Positive(x) | Shape::Negative(x) => {
+                vec![(*x, 1)]
+            }
+            Shape::Power(x, n) => vec![(*x, *n)],
+            Shape::SignedSquare(x) => vec![(*x, 2)],
+            Shape::Product(a, b) => {
+                let mut all = a.powers();
+                all.extend(b.powers());
+                all
+            }
+        }
+    }
+
+    /// What it depends on.
+    pub(super) fn variables(&self) -> Vec<Variable> {
+        match self {
+            Shape::One => Vec::new(),
+            Shape::Is(x)
+            | Shape::Magnitude(x)
+            | Shape::Power(x, _)
+            | Shape::SignedSquare(x)
+            | Shape::Direction(x, _)
+            | Shape::Positive(x)
+            | Shape::Negative(x)
+            | Shape::Cosine(x, _)
+            | Shape::Sine(x, _) => vec![*x],
+            Shape::Product(a, b) => {
+                let mut all = a.variables();
+                all.extend(b.variables());
+                all
+            }
+        }
+    }
+}
+
+/// A quantity that a force at a place may depend on.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Quantity {
+    pub(super) variable: Variable,
+    pub(super) unit: String,
+    /// An angle that makes turns: what depends on it repeats.
+    pub(super) turns: bool,
+    /// Root mean square in the recording.
+    pub(super) rms: f64,
+}
+
+/// Waves per revolution that are tried.
+const WAVES: u32 = 6;
+/// Smoothing widths of a direction, as shares of the variable's root mean square.
+const WIDTHS: [f64; 3] = [0.05, 0.2, 0.6];
+
+/// Terms that are chosen together: a wave has a cosine and a sine.
+pub(super) type Term = Vec<Shape>;
+
+/// Everything that may be a term of a force that depends on `quantities`, the simple before the
+/// intricate.
+pub(super) fn terms(quantities: &[Quantity]) -> Vec<Term> {
+    let mut all: Vec<Term> = vec![vec![Shape::One]];
+    let of = |role: Role| {
+        let variable = Variable::Role(role);
+        quantities.iter().find(|q| q.variable == variable)
+    };
+    let flow = of(Role::Flow);
+    for q in quantities {
+        let x = q.variable;
+        let mut singles = vec![Shape::Is(x), Shape::Magnitude(x)];
+        // Nothing signed about time, and the sign of where an axis stands is nothing special.
+        if x != Variable::Time && !q.turns {
+            singles.extend(WIDTHS.map(|w| Shape::Direction(x, w * q.rms)));
+            singles.extend([
+                Shape::SignedSquare(x),
+                Shape::Positive(x),
+                Shape::Negative(x),
+            ]);
+            for half in [Shape::Positive(x), Shape::Negative(x)] {
+                singles.push(half.times(&Shape::Is(x)));
+            }
+        }
+        singles.extend([Shape::Power(x, 2), Shape::Power(x, 3)]);
+        all.extend(singles.into_iter().map(|s| vec![s]));
+    }
+    let waves = |x: Variable, with: &Shape| -> Vec<Term> {
+        (1..=WAVES)
+            .map(|n| {
+                [Shape::Cosine(x, n), Shape::Sine(x, n)]
+                    .map(|wave| with.times(&wave))
+                    .to_vec()
+            })
+            .collect()
+    };
+    let angles: Vec<Variable> = quantities
+        .iter()
+        .filter(|q| q.turns)
+        .map(|q| q.variable)
+        .collect();
+    for angle in &angles {
+        all.extend(waves(*angle, &Shape::One));
+    }
+    if let Some(flow) = flow {
+        let x = flow.variable;
+        let direction = Shape::Direction(x, WIDTHS[1] * flow.rms);
+        for q in quantities.iter().filter(|q| q.variable != x) {
+            let mut with = vec![Shape::Is(q.variable), Shape::Magnitude(q.variable)];
+            with.dedup();
+            for factor in with {
+                all.push(vec![direction.times(&factor)]);
+                all.push(vec![Shape::Is(x).times(&factor)]);
+            }
+        }
+        for angle in &angles {
+            for factor in [direction.clone(), Shape::Is(x), Shape::Magnitude(x)] {
+                all.extend(waves(*angle, &factor));
+            }
+        }
+    }
+    if let Some(drive) = of(Role::Drive) {
+        for angle in &angles {
+            all.extend(waves(*angle, &Shape::Is(drive.variable)));
+        }
+        all.push(vec![
+            Shape::Is(drive.variable).times(&Shape::Is(Variable::Time)),
+        ]);
+    }
+    all
+}
+
+/// Whether a signal is an angle that made at least about a turn.
+pub(super) fn turns(unit: &str, low: f64, high: f64) -> bool {
+    unit == "rad" && high - low > 0.75 * TAU
+}
