@@ -142,7 +142,7 @@ mod tests {
             depends_on: vec![Dependence {
                 quantity: "position".into(),
                 unit: "rad".into(),
-                period: Some(6.28),
+                period: Some(std::f64::consts::TAU),
                 share_of_variance: 0.62,
                 curves: vec![curve("forwards", 1.0), curve("backwards", -1.0)],
             }],
