@@ -14,7 +14,7 @@ use crate::flatness::Flatness;
 use crate::noise;
 use crate::observer::{growth, hold_with};
 use crate::prediction::InitialStates;
-use crate::problem::{Effort, Problem};
+use crate::problem::{Effort, Problem, declared};
 use crate::regression::batch;
 
 /// Fits the free parameters and the initial states of all runs.
@@ -110,12 +110,17 @@ pub(crate) fn prepare<'a>(
     Ok(prepared)
 }
 
-/// The file's values, or those of a regression where it gives none.
+/// The file's values, or those of a regression where it gives none; sizes of the declarations where
+/// the plant offers no regression.
 fn first_values(model: &Model, runs: &[Run], settings: &FitSettings) -> Option<Vec<f64>> {
     if model.missing_values().is_empty() {
         return Some(model.values());
     }
-    batch(model, runs, settings.scheme, 0.0).ok()
+    match batch(model, runs, settings.scheme, 0.0) {
+        Ok(values) => Some(values),
+        Err(FitError::NoRegression(_)) => Some(declared(model)),
+        Err(_) => None,
+    }
 }
 
 impl Problem<'_> {

@@ -162,7 +162,8 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// The file's values, and those of regressions; whichever runs closest to the data.
+    /// The file's values, and those of regressions; whichever runs closest to the data. Where there
+    /// is neither, the sizes of the declarations.
     pub(crate) fn start(&self, settings: &FitSettings) -> Result<DVector<f64>, FitError> {
         let mut candidates = Vec::new();
         if self.model.missing_values().is_empty() {
@@ -175,8 +176,11 @@ impl<'a> Problem<'a> {
                 Err(error) => failure = Some(error),
             }
         }
-        if let (true, Some(error)) = (candidates.is_empty(), failure) {
-            return Err(error);
+        if candidates.is_empty() {
+            match failure {
+                Some(FitError::NoRegression(_)) | None => candidates.push(declared(self.model)),
+                Some(error) => return Err(error),
+            }
         }
         let mut best: Option<(f64, DVector<f64>)> = None;
         for values in candidates {
@@ -434,6 +438,15 @@ fn nominal(model: &Model) -> Vec<f64> {
         .parameters
         .iter()
         .map(|p| p.value.unwrap_or(0.0))
+        .collect()
+}
+
+/// The file's values, and where it gives none what the declaration calls a noticeable size.
+pub(crate) fn declared(model: &Model) -> Vec<f64> {
+    model
+        .parameters
+        .iter()
+        .map(|p| p.value.unwrap_or_else(|| p.declaration.nearest(p.scale())))
         .collect()
 }
 

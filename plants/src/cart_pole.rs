@@ -226,7 +226,7 @@ impl Plant<4, 1, 2, 4, 0> for CartPole {
         equation: "M p'' + b cos(θ) θ'' = F + b sin(θ) θ'^2;  b cos(θ) p'' + J θ'' = b g sin(θ)",
         reference: "Florian (2007), Correct equations for the dynamics of the cart-pole system, Center for Cognitive and Neural Studies, equations (23), (24)",
         assumptions: "rigid pole, level rail, no friction",
-        example: "[plant.cart_pole]\ntotal_mass = 1.2\npole_moment = 0.06\npole_inertia = 0.024\n",
+        example: "[plant.cart_pole]\ntotal_mass = 1.2        # kg, cart and pole\npole_moment = 0.06      # kg m, mass of the pole times the way to its centre\npole_inertia = 0.024    # kg m², about the pivot\n",
         states: &[
             Signal::new("position", "p", "m", "position of the cart"),
             Signal::new("velocity", "v", "m/s", "velocity of the cart"),

@@ -7,12 +7,15 @@
     reason = "a wrong conclusion is how this program fails"
 )]
 
+use assert_cmd::Command;
 use loopsight_core::model::Model;
 use loopsight_core::run::Run;
 use loopsight_diagnosis::fit::{Fit, fit};
 use loopsight_diagnosis::{Because, Conclusion, FitSettings, compare, diagnose};
 use loopsight_tests::balance::{axis, cart_pole, servo, upright};
+use loopsight_tests::{repository, unknown};
 use rayon::prelude::*;
+use serde_json::Value;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=8;
 /// A first guess that is off by a quarter.
@@ -77,6 +80,14 @@ fn a_pole_needs_no_speeds_to_tell_its_masses() {
 }
 
 #[test]
+fn a_pole_needs_no_first_guess() {
+    let truth = cart_pole([1.0; 3], "", true);
+    let fit = fitted(&unknown(truth.clone()), upright(&truth, 20.0, 9));
+    assert_eq!(fit.nrmse_before, None);
+    covered(&[fit], &POLE);
+}
+
+#[test]
 fn a_wrong_model_of_a_pole_is_compared_without_running_away() {
     let truth = cart_pole([1.0; 3], "", true);
     let run = upright(&truth, 30.0, 1);
@@ -103,20 +114,28 @@ fn nothing_is_missing_from_a_pole_without_a_secret() {
     assert_eq!(told.observer.unwrap().because, Because::Unstable);
 }
 
+/// The story of `examples/cart-pole`, as a user has it.
 #[test]
 fn friction_of_the_cart_is_named_from_a_pole_held_upright() {
-    let friction =
-        "[[effect]]\n[effect.coulomb_friction]\nat = [\"cart\"]\nlevel = 0.4\nwidth = 0.002\n";
-    let truth = cart_pole([1.0; 3], friction, true);
-    let run = upright(&truth, 30.0, 5);
-    let told = diagnose(&cart_pole(OFF, "", true), &[run], None, &[], &|_, _| {}).unwrap();
-    let missing = told.missing.unwrap();
-    assert_eq!(missing.effect, "coulomb_friction");
-    assert_eq!(missing.at, ["cart"]);
-    let best = &told.candidates[0];
-    let level = best.parameters["level"].value;
-    assert!((level - 0.4).abs() < 0.02, "{level} N");
-    assert!(best.nrmse < 1.2 * told.floor.nrmse && told.nominal.nrmse > 2.0 * best.nrmse);
+    let folder = repository().join("examples/cart-pole");
+    let output = Command::new(env!("CARGO_BIN_EXE_loopsight-under-test"))
+        .current_dir(folder)
+        .args(["diagnose", "model.toml", "upright.csv", "--json"])
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    assert!(text.contains("The model lacks coulomb_friction at cart"));
+    assert!(text.contains("note: the model is unstable"), "{text}");
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(told["missing"]["at"], serde_json::json!(["cart"]));
+    assert_eq!(told["observer"]["because"], "unstable");
+    let number = |value: &Value| value.as_f64().unwrap();
+    let best = &told["candidates"][0];
+    let level = number(&best["parameters"]["level"]["value"]);
+    assert!((level - 0.4).abs() < 0.01, "{level} N");
+    assert!(number(&best["nrmse"]) < 1.2 * number(&told["floor"]["nrmse"]));
+    assert!(number(&told["nominal"]["nrmse"]) > 2.0 * number(&best["nrmse"]));
 }
 
 const AXIS: [(&str, f64); 2] = [("K_A", -0.08), ("K_C", 6.0)];
