@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use loopsight_diagnosis::{Comparison, Fit, Held, ResidualForce, Verdict};
+use loopsight_diagnosis::{Comparison, Fit, Held, ResidualForce, Statement, Verdict};
 use loopsight_recordings::{Fault, Severity};
 use serde::Serialize;
 
@@ -135,14 +135,23 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
             ]
         })
         .collect();
+    let failures = where_it_fails(&comparison.where_it_fails);
     format!(
-        "{}free run: error {} of the standard deviation, fit {:.2} %\n{}{}",
+        "{}free run: error {} of the standard deviation, fit {:.2} %\n{}{}{failures}",
         faults(&comparison.faults),
         percent(comparison.nrmse),
         comparison.fit_percent,
         held(comparison.observer.as_ref()),
         table(&["signal", "rmse", "nrmse", "fit", "one-step nrmse"], &rows)
     )
+}
+
+/// Where a model fails: a line for each statement.
+pub(crate) fn where_it_fails(statements: &[Statement]) -> String {
+    statements
+        .iter()
+        .map(|s| format!("\nwhere it fails: {}", s.statement))
+        .collect()
 }
 
 /// That a free run was held to the measurements, where it was; with a line's end.

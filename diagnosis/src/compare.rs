@@ -9,7 +9,9 @@ use serde::Serialize;
 
 use crate::observer::{Held, hold};
 use crate::prediction::{InitialStates, one_step};
+use crate::problem::Solution;
 use crate::score::{SignalScore, Tally, overall};
+use crate::where_it_fails::{Statement, where_it_fails};
 
 /// The result of [`compare`].
 #[derive(Clone, Debug, Serialize)]
@@ -26,6 +28,9 @@ pub struct Comparison {
     /// alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observer: Option<Held>,
+    /// Where the free run fails, the most telling first.
+    #[serde(skip)]
+    pub where_it_fails: Vec<Statement>,
     /// Everything a picture needs.
     #[serde(skip)]
     pub runs: Vec<RunTrace>,
@@ -40,6 +45,7 @@ impl Comparison {
             signals: Vec::new(),
             faults: Vec::new(),
             observer: None,
+            where_it_fails: Vec::new(),
             runs: Vec::new(),
         }
     }
@@ -141,12 +147,15 @@ pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparis
         .map(|(tally, m)| tally.score(m.signal.id, m.signal.unit))
         .collect();
     let nrmse = overall(&signals);
+    let states = initial.states;
+    let solution = Solution { values, states };
     Ok(Comparison {
         nrmse,
         fit_percent: 100.0 * (1.0 - nrmse),
         signals,
         faults: faults.to_vec(),
         observer: Held::of(&runs),
+        where_it_fails: where_it_fails(model, &solution, &runs),
         runs: traces,
     })
 }

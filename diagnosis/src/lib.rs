@@ -15,6 +15,7 @@ mod growth;
 mod holdout;
 mod improve;
 mod judge;
+mod motion;
 mod noise;
 mod observer;
 mod output_error;

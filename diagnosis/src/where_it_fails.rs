@@ -1,10 +1,11 @@
-//! Where a model fails, in words with numbers.
+//! Where a model fails, in words with numbers: the one place that says so.
 
 use loopsight_core::model::{Model, signals};
 use loopsight_core::run::Run;
 use loopsight_core::simulate::{Simulator, follow};
 use serde::Serialize;
 
+use crate::motion::{Motion, changes, rest, speed};
 use crate::problem::Solution;
 
 /// One statement.
@@ -14,6 +15,9 @@ pub struct Statement {
     pub statement: String,
     /// Share of the squared error it speaks of.
     pub share_of_squared_error: f64,
+    /// The measured signal it speaks of.
+    #[serde(skip)]
+    pub signal: String,
 }
 
 /// How long after a change of direction its effect is looked for, s.
@@ -22,13 +26,21 @@ const AFTER_CHANGE: f64 = 0.1;
 const BINS: usize = 20;
 /// A statement must speak of this much more error than its share of the samples.
 const TELLING: f64 = 1.5;
+/// Fewest samples of a direction of motion.
+const FEWEST: usize = 10;
+/// Most statements of a diagnosis.
+const MOST: usize = 8;
 
 /// Samples of one signal.
+#[derive(Default)]
 struct Samples {
     error: Vec<f64>,
-    measured: Vec<f64>,
-    time: Vec<f64>,
+    /// What tells the direction of motion, and below which it counts as rest.
+    speed: Vec<f64>,
+    rest: f64,
     run: Vec<usize>,
+    /// Just after a change of direction.
+    after_change: Vec<bool>,
     /// By signal of the plant.
     quantities: Vec<Vec<f64>>,
 }
@@ -36,50 +48,92 @@ struct Samples {
 /// Statements about the free run of the fitted model, the most telling first.
 pub(crate) fn where_it_fails(model: &Model, solution: &Solution, runs: &[Run]) -> Vec<Statement> {
     let mut list = Vec::new();
-    for (i, m) in model.measured.iter().enumerate() {
-        let samples = collect(model, solution, runs, i);
-        let name = m.signal.id;
-        list.extend(after_change(name, &samples));
-        list.extend(by_direction(name, m.signal.unit, &samples));
-        list.extend(dependence(model, name, &samples));
-        list.extend(by_run(name, runs, &samples));
+    for (m, samples) in model.measured.iter().zip(collect(model, solution, runs)) {
+        let (name, unit) = (m.signal.id, m.signal.unit);
+        let motion = Motion::of(unit);
+        let found = [
+            after_change(name, motion, &samples),
+            by_direction(name, unit, motion, &samples),
+            dependence(model, name, &samples),
+            by_run(name, runs, &samples),
+        ];
+        list.extend(
+            found
+                .into_iter()
+                .flatten()
+                .map(|(statement, share)| Statement {
+                    statement,
+                    share_of_squared_error: share,
+                    signal: name.to_owned(),
+                }),
+        );
     }
     list.sort_by(|a, b| {
         b.share_of_squared_error
             .total_cmp(&a.share_of_squared_error)
     });
-    list.truncate(8);
+    list.truncate(MOST);
     list
 }
 
-fn collect(model: &Model, solution: &Solution, runs: &[Run], signal: usize) -> Samples {
-    let n = signals(model.plant).count();
-    let mut samples = Samples {
-        error: Vec::new(),
-        measured: Vec::new(),
-        time: Vec::new(),
-        run: Vec::new(),
-        quantities: vec![Vec::new(); n],
-    };
+/// The samples of each measured signal.
+fn collect(model: &Model, solution: &Solution, runs: &[Run]) -> Vec<Samples> {
+    let n = model.measured.len();
+    let mut all: Vec<Samples> = (0..n)
+        .map(|_| Samples {
+            quantities: vec![Vec::new(); signals(model.plant).count()],
+            ..Samples::default()
+        })
+        .collect();
+    let speeds: Vec<Vec<Vec<f64>>> = model
+        .measured
+        .iter()
+        .enumerate()
+        .map(|(i, m)| {
+            let of_run = |run: &Run| {
+                let values: Vec<f64> = (0..run.len()).map(|k| run.sample(k)[i]).collect();
+                speed(&run.time, &values, Motion::of(m.signal.unit))
+            };
+            runs.iter().map(of_run).collect()
+        })
+        .collect();
+    for (samples, of_signal) in all.iter_mut().zip(&speeds) {
+        samples.rest = rest(of_signal.iter().flatten().copied());
+    }
     for (index, (run, x0)) in runs.iter().zip(&solution.states).enumerate() {
+        let turned: Vec<Vec<usize>> = all
+            .iter()
+            .zip(&speeds)
+            .map(|(samples, of_signal)| changes(&of_signal[index], samples.rest))
+            .collect();
         let mut simulator = Simulator::new(model, &solution.values);
-        follow(&mut simulator, x0.as_slice(), run, |k, y, now| {
-            let measured = run.sample(k)[signal];
-            let error = measured - y[signal];
-            if !error.is_finite() {
-                return;
-            }
-            samples.error.push(error);
-            samples.measured.push(measured);
-            samples.time.push(run.time[k]);
-            samples.run.push(index);
-            for (list, value) in samples.quantities.iter_mut().zip(now.signals()) {
-                list.push(*value);
+        follow(&mut simulator, x0.as_slice(), run, |k, predicted, now| {
+            for (i, samples) in all.iter_mut().enumerate() {
+                let error = run.sample(k)[i] - predicted[i];
+                if !error.is_finite() {
+                    continue;
+                }
+                samples.error.push(error);
+                samples.speed.push(speeds[i][index][k]);
+                samples.run.push(index);
+                let last = turned[i].partition_point(|change| *change <= k);
+                let since = last
+                    .checked_sub(1)
+                    .map(|last| run.time[k] - run.time[turned[i][last]]);
+                samples
+                    .after_change
+                    .push(since.is_some_and(|s| s < AFTER_CHANGE * (1.0 + 1e-9)));
+                for (list, value) in samples.quantities.iter_mut().zip(now.signals()) {
+                    list.push(*value);
+                }
             }
         });
     }
-    samples
+    all
 }
+
+/// A statement, and the share of the squared error it speaks of.
+type Said = (String, f64);
 
 fn share(samples: &Samples, pick: impl Fn(usize) -> bool) -> (f64, f64) {
     let (mut inside, mut all, mut count) = (0.0, 0.0, 0usize);
@@ -96,40 +150,24 @@ fn share(samples: &Samples, pick: impl Fn(usize) -> bool) -> (f64, f64) {
     )
 }
 
-fn after_change(name: &str, samples: &Samples) -> Option<Statement> {
-    let rms = (samples.measured.iter().map(|v| v * v).sum::<f64>()
-        / samples.measured.len().max(1) as f64)
-        .sqrt();
-    let mut marked = vec![false; samples.error.len()];
-    let mut direction = 0.0;
-    let mut changed_at: Option<(usize, f64)> = None;
-    for (k, mark) in marked.iter_mut().enumerate() {
-        let v = samples.measured[k];
-        if v.abs() > 0.05 * rms {
-            if direction != 0.0 && v.signum() != direction {
-                changed_at = Some((samples.run[k], samples.time[k]));
-            }
-            direction = v.signum();
-        }
-        *mark = changed_at
-            .is_some_and(|(run, t)| run == samples.run[k] && samples.time[k] - t <= AFTER_CHANGE);
-    }
-    let (error, part) = share(samples, |k| marked[k]);
-    (part > 0.0 && error > TELLING * part).then(|| Statement {
-        statement: format!(
-            "{:.0} % of the squared error of {name} lies within {AFTER_CHANGE} s after a change of direction, which is {:.0} % of the time",
+fn after_change(name: &str, motion: Motion, samples: &Samples) -> Option<Said> {
+    let (error, part) = share(samples, |k| samples.after_change[k]);
+    (part > 0.0 && error > TELLING * part).then(|| {
+        let said = format!(
+            "{:.0} % of the squared error of {name} lies within {AFTER_CHANGE} s after a {}, which is {:.0} % of the time",
             100.0 * error,
+            motion.change(),
             100.0 * part
-        ),
-        share_of_squared_error: error,
+        );
+        (said, error)
     })
 }
 
-fn by_direction(name: &str, unit: &str, samples: &Samples) -> Option<Statement> {
+fn by_direction(name: &str, unit: &str, motion: Motion, samples: &Samples) -> Option<Said> {
     let mean = |sign: f64| {
         let (mut sum, mut n) = (0.0, 0usize);
-        for (e, v) in samples.error.iter().zip(&samples.measured) {
-            if v * sign > 0.0 {
+        for (e, v) in samples.error.iter().zip(&samples.speed) {
+            if v * sign > samples.rest {
                 sum += e;
                 n += 1;
             }
@@ -137,22 +175,23 @@ fn by_direction(name: &str, unit: &str, samples: &Samples) -> Option<Statement> 
         (sum / n.max(1) as f64, n)
     };
     let ((forwards, a), (backwards, b)) = (mean(1.0), mean(-1.0));
-    if a < 10 || b < 10 {
+    if a < FEWEST || b < FEWEST {
         return None;
     }
     let explained = a as f64 * forwards * forwards + b as f64 * backwards * backwards;
     let all: f64 = samples.error.iter().map(|e| e * e).sum();
     let part = explained / all;
-    (part > 0.05).then(|| Statement {
-        statement: format!(
-            "the mean residual of {name} is {forwards:+.3} {unit} forwards and {backwards:+.3} {unit} backwards"
-        ),
-        share_of_squared_error: part,
+    (part > 0.05).then(|| {
+        let [ahead, back] = motion.directions(unit);
+        let said = format!(
+            "the mean residual of {name} is {forwards:+.3} {unit} {ahead} and {backwards:+.3} {unit} {back}"
+        );
+        (said, part)
     })
 }
 
 /// The quantity that the residual depends on most: share of its variance between bins.
-fn dependence(model: &Model, name: &str, samples: &Samples) -> Option<Statement> {
+fn dependence(model: &Model, name: &str, samples: &Samples) -> Option<Said> {
     let all: f64 = samples.error.iter().map(|e| e * e).sum();
     let mut best: Option<(f64, &str)> = None;
     for (signal, values) in signals(model.plant).zip(&samples.quantities) {
@@ -182,16 +221,16 @@ fn dependence(model: &Model, name: &str, samples: &Samples) -> Option<Statement>
         }
     }
     let (part, quantity) = best?;
-    (part > 0.1).then(|| Statement {
-        statement: format!(
+    (part > 0.1).then(|| {
+        let said = format!(
             "the residual of {name} depends on {quantity}: its mean over that accounts for {:.0} % of the squared error",
             100.0 * part
-        ),
-        share_of_squared_error: part,
+        );
+        (said, part)
     })
 }
 
-fn by_run(name: &str, runs: &[Run], samples: &Samples) -> Option<Statement> {
+fn by_run(name: &str, runs: &[Run], samples: &Samples) -> Option<Said> {
     if runs.len() < 2 {
         return None;
     }
@@ -201,13 +240,16 @@ fn by_run(name: &str, runs: &[Run], samples: &Samples) -> Option<Statement> {
             (i, error, part)
         })
         .max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
-    (error > TELLING * part && error > 0.3).then(|| Statement {
-        statement: format!(
-            "{:.0} % of the squared error of {name} is in run {}, which is {:.0} % of the samples",
+    (error > TELLING * part && error > 0.3).then(|| {
+        let called = match runs[worst].name.as_str() {
+            "" => format!("{}", worst + 1),
+            called => called.to_owned(),
+        };
+        let said = format!(
+            "{:.0} % of the squared error of {name} is in run {called}, which is {:.0} % of the samples",
             100.0 * error,
-            runs[worst].name,
             100.0 * part
-        ),
-        share_of_squared_error: error,
+        );
+        (said, error)
     })
 }

@@ -423,8 +423,13 @@ fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
     let is_short = |run: &Run| run.duration() < SHORT_RUN;
     let list = runs
         .iter()
-        .filter(|run| is_short(run))
-        .map(|run| format!("`{}` {:.2} s", run.name, run.duration()))
+        .enumerate()
+        .filter(|(_, run)| is_short(run))
+        .map(|(i, run)| match run.name.as_str() {
+            "" if runs.len() == 1 => format!("{:.2} s", run.duration()),
+            "" => format!("run {} {:.2} s", i + 1, run.duration()),
+            name => format!("`{name}` {:.2} s", run.duration()),
+        })
         .collect::<Vec<_>>();
     if list.is_empty() {
         return (runs, None);

@@ -4,12 +4,12 @@ use loopsight_diagnosis::{Comparison, RunTrace, SignalScore};
 use loopsight_recordings::{Fault, Severity};
 
 use crate::chart::{Chart, Role};
-use crate::errors::{errors, residual, rms, signal};
-use crate::html::{escape, identifier, list, marked, table};
+use crate::errors::{residual, rms, signal};
+use crate::html::{escape, identifier, list, marked, sentence, table};
 use crate::numbers::{axis, plain, quantity, show, tenths};
 use crate::page::{Context, page, section};
 use crate::scatter;
-use crate::words::{run_name, verdict, where_it_fails};
+use crate::words::{run_name, verdict};
 
 /// The page that holds a model against measurements: scores, faults of the log, every run over
 /// time, and where the model fails.
@@ -209,11 +209,15 @@ fn failures(comparison: &Comparison) -> String {
     };
     let mut out = String::new();
     for score in &comparison.signals {
-        let said = where_it_fails(
-            &score.unit,
-            &errors(&comparison.runs, &score.id),
-            &comparison.runs,
-        );
+        let mut said: Vec<String> = comparison
+            .where_it_fails
+            .iter()
+            .filter(|s| s.signal == score.id)
+            .map(|s| sentence(&s.statement))
+            .collect();
+        if said.is_empty() {
+            said.push("The error has no pattern that stands out.".to_owned());
+        }
         let charts: String =
             scatter::charts(&comparison.runs, None, &score.id, &score.unit).concat();
         out.push_str(&format!(
@@ -243,7 +247,8 @@ mod tests {
             "inputs, V",
             "linear_velocity, m/s",
             "residual of angular_velocity, rad/s",
-            "m/s forwards, +0.0",
+            "The mean residual of linear_velocity is -0.030 m/s forwards and +0.031 m/s backwards.",
+            "The error has no pattern that stands out.",
             "data-run=\"run-2\"",
             "model, free run",
             "\"hidden\":true",

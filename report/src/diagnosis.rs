@@ -6,7 +6,7 @@ use crate::beside::{self, Names};
 use crate::candidates;
 use crate::comparison::faults;
 use crate::conclusion::{effect_name, found, of_diagnosis};
-use crate::html::marked;
+use crate::html::{marked, sentence};
 use crate::next;
 use crate::numbers::percent;
 use crate::page::{Context, page, section};
@@ -187,20 +187,6 @@ pub(crate) fn advice(advice: &[Advice]) -> String {
         "",
         &format!("<ul class=\"advice\">{items}</ul>\n"),
     )
-}
-
-/// A capital letter at the beginning and a full stop at the end.
-fn sentence(text: &str) -> String {
-    let mut chars = text.chars();
-    match chars.next() {
-        Some(first) => format!(
-            "{}{}{}",
-            first.to_uppercase(),
-            chars.as_str(),
-            if text.ends_with('.') { "" } else { "." }
-        ),
-        None => String::new(),
-    }
 }
 
 /// The words of the page.

@@ -103,6 +103,7 @@ pub(crate) fn diagnosis(verdict: Conclusion) -> Diagnosis {
         where_it_fails: vec![Statement {
             statement: "73 % of it after changes".into(),
             share_of_squared_error: 0.73,
+            signal: "linear_velocity".into(),
         }],
         residual_force: None,
         faults: if verdict == Conclusion::LogFaulty {

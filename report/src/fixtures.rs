@@ -1,6 +1,6 @@
 //! Traces of a vehicle with friction against a model without, shared by the tests.
 
-use loopsight_diagnosis::{Comparison, RunTrace, SignalScore, SignalTrace};
+use loopsight_diagnosis::{Comparison, RunTrace, SignalScore, SignalTrace, Statement};
 
 use crate::page::Context;
 use crate::{ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace};
@@ -115,6 +115,11 @@ pub(crate) fn comparison(runs: Vec<RunTrace>) -> Comparison {
         signals: scores(),
         faults: vec![],
         observer: None,
+        where_it_fails: vec![Statement {
+            statement: "the mean residual of linear_velocity is -0.030 m/s forwards and +0.031 m/s backwards".into(),
+            share_of_squared_error: 0.6,
+            signal: "linear_velocity".into(),
+        }],
         runs,
     }
 }

@@ -37,6 +37,20 @@ pub(crate) fn marked(text: &str) -> String {
     out
 }
 
+/// A capital letter at the beginning and a full stop at the end.
+pub(crate) fn sentence(text: &str) -> String {
+    let mut chars = text.chars();
+    match chars.next() {
+        Some(first) => format!(
+            "{}{}{}",
+            first.to_uppercase(),
+            chars.as_str(),
+            if text.ends_with('.') { "" } else { "." }
+        ),
+        None => String::new(),
+    }
+}
+
 /// JSON that can stand inside a `<script>` element: no `<` can end it.
 pub(crate) fn json(value: &impl serde::Serialize) -> String {
     // Plain data of numbers and texts always serialises.

@@ -31,16 +31,6 @@ pub(crate) fn show(value: f64, digits: usize) -> String {
     text.replace('-', "−")
 }
 
-/// As [`show`], with a plus sign where positive.
-pub(crate) fn signed(value: f64, digits: usize) -> String {
-    let text = show(value, digits);
-    if significant(value, digits) > 0.0 {
-        format!("+{text}")
-    } else {
-        text
-    }
-}
-
 /// A share as percent, with as many digits as mean something: `73 %`, `0.4 %`.
 pub(crate) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
@@ -155,8 +145,6 @@ mod tests {
         assert_eq!(show(9.999e11, 3), "1.00·10¹²");
         assert_eq!(show(f64::NAN, 3), "–");
         assert_eq!(show(f64::NEG_INFINITY, 3), "−∞");
-        assert_eq!(signed(0.029, 2), "+0.029");
-        assert_eq!(signed(-0.031, 2), "−0.031");
         assert_eq!(percent(0.7312), "73\u{a0}%");
         assert_eq!(percent(0.0042), "0.4\u{a0}%");
         assert_eq!(percent(0.000_068), "0.007\u{a0}%");

@@ -3,7 +3,7 @@
 use loopsight_diagnosis::{Bin, Curve, Dependence, ResidualForce};
 
 use crate::chart::{Abscissae, Chart, Role, Trace};
-use crate::html::{escape, marked};
+use crate::html::{escape, marked, sentence};
 use crate::numbers::{axis, percent, significant};
 use crate::page::section;
 
@@ -57,14 +57,6 @@ pub(crate) fn residual_force(force: Option<&ResidualForce>) -> String {
          Lines: the expression below, over the same samples.",
         &body,
     )
-}
-
-/// A capital letter at the beginning and a full stop at the end.
-fn sentence(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or_else(String::new, |first| {
-        format!("{}{}.", first.to_uppercase(), chars.as_str())
-    })
 }
 
 fn chart(force: &ResidualForce, of: &Dependence) -> Chart {

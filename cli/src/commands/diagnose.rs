@@ -120,9 +120,7 @@ fn text(diagnosis: &Diagnosis) -> String {
             ));
         }
     }
-    for statement in &diagnosis.where_it_fails {
-        text.push_str(&format!("\nwhere it fails: {}", statement.statement));
-    }
+    text.push_str(&output::where_it_fails(&diagnosis.where_it_fails));
     for advice in &diagnosis.advice {
         text.push_str(&format!("\nadvice: {}: {}", advice.why, advice.experiment));
     }
