@@ -20,7 +20,7 @@ use crate::output;
 const DRIVE: f64 = 9.0;
 /// Of an input at its limit, in sizes of its signal: 12 V at a motor.
 const LIMIT: f64 = 12.0;
-/// Noise of a sensor over what its signal does in the experiment.
+/// Noise of a sensor over what its signal does while the inputs are held once.
 const NOISE: f64 = 0.01;
 
 pub(super) fn write(target: &Path, plant: &str) -> Result<(), Failure> {
@@ -36,7 +36,7 @@ pub(super) fn write(target: &Path, plant: &str) -> Result<(), Failure> {
     let trial = simulate(&model, &experiment_text(meta, &[], pace), meta)?;
     let noise: Vec<(&str, f64)> = measured
         .iter()
-        .zip(deviations(&trial))
+        .zip(deviations(&trial, pace))
         .map(|(signal, deviation)| (signal.id, rounded_down(NOISE * deviation)))
         .filter(|(_, noise)| *noise > 0.0 && noise.is_finite())
         .collect();
@@ -281,13 +281,19 @@ fn simulate(model: &Model, text: &str, meta: &PlantMeta) -> Result<Run, Failure>
     Ok(Experiment::parse(&source)?.simulate(&source, model)?)
 }
 
-/// Standard deviation of each measured signal.
-fn deviations(run: &Run) -> Vec<f64> {
+/// What each measured signal does while the inputs are held once: the rms of its change over that
+/// time, over √2. Of a signal that comes to rest it is the standard deviation; of one that drifts
+/// away it is not the whole way.
+fn deviations(run: &Run, pace: Pace) -> Vec<f64> {
+    let apart = ((pace.hold() / pace.period()) as usize).clamp(1, run.len().max(2) - 1);
     (0..run.n_measured)
         .map(|i| {
-            let samples = || (0..run.len()).map(|k| run.sample(k)[i]);
-            let mean = samples().sum::<f64>() / run.len() as f64;
-            (samples().map(|y| (y - mean) * (y - mean)).sum::<f64>() / run.len() as f64).sqrt()
+            let squares = (apart..run.len()).map(|k| {
+                let change = run.sample(k)[i] - run.sample(k - apart)[i];
+                change * change
+            });
+            let mean = squares.sum::<f64>() / run.len().saturating_sub(apart).max(1) as f64;
+            (0.5 * mean).sqrt()
         })
         .collect()
 }
@@ -301,7 +307,7 @@ fn with_loop(
     pace: Pace,
 ) -> Result<bool, Failure> {
     for learns in [true, false] {
-        let text = loop_text(folder.name(), meta, &deviations(trial), pace, learns);
+        let text = loop_text(folder.name(), meta, &deviations(trial, pace), pace, learns);
         let path = folder.inside().join("loop.toml");
         let source = Source::parse(&path.display().to_string(), &text)?;
         let composed = LoopFile::parse(&source)
