@@ -18,6 +18,7 @@ use crate::holdout::Holdout;
 use crate::judge::{Losses, advantage, nrmse, significance};
 use crate::observer::{Held, hold_alike};
 use crate::output_error::prepare;
+use crate::positions::Positions;
 use crate::prediction::signal_rms;
 use crate::problem::{Effort, Problem, Solution};
 use crate::residual_force;
@@ -342,9 +343,17 @@ fn promise(
 ) -> Option<f64> {
     let model = coarse(candidate);
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
-    Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {})
-        .ok()?
-        .promise(start, &states)
+    let mut problem =
+        Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {}).ok()?;
+    problem.positions = positions(candidate, start);
+    problem.promise(start, &states)
+}
+
+/// Where the candidate reads a position it is first tried at the measured ones.
+fn positions(candidate: &Candidate, start: &[f64]) -> Option<Positions> {
+    Positions::matter_to(candidate.meta)
+        .then(|| Positions::of(&candidate.model, start))
+        .flatten()
 }
 
 /// A quick fit of a candidate from one start, with the nominal initial states.
@@ -356,10 +365,14 @@ fn look(
 ) -> Option<Judged> {
     let model = coarse(candidate);
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
-    let solution = Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {})
-        .ok()?
-        .solve_from(start, &states, LOOK)
-        .ok()?;
+    let problem = || Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {});
+    let mut start = start.to_vec();
+    if let Some(measured) = positions(candidate, &start) {
+        let mut problem = problem().ok()?;
+        problem.positions = Some(measured);
+        start = problem.solve_from(&start, &states, LOOK).ok()?.values;
+    }
+    let solution = problem().ok()?.solve_from(&start, &states, LOOK).ok()?;
     let losses = holdout.judge(&model, &solution);
     let rank = holdout.rank(&model, &solution, &losses);
     nrmse(&rank).is_finite().then(|| Judged {

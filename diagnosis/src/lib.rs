@@ -19,6 +19,7 @@ mod motion;
 mod noise;
 mod observer;
 mod output_error;
+mod positions;
 mod prediction;
 mod problem;
 mod regression;

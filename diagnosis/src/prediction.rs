@@ -2,9 +2,11 @@
 
 use loopsight_core::model::{Model, pseudo_inverse};
 use loopsight_core::run::Run;
-use loopsight_core::simulate::{Simulator, follow, free_run};
+use loopsight_core::simulate::{Simulator, follow};
 use loopsight_core::{DUAL_WIDTH, Dual, Real, derivative, variable};
 use nalgebra::{DMatrix, DVector};
+
+use crate::positions::{Positions, run_with};
 
 /// Plant states of which a measured signal is a direct function: those an initial state can be
 /// estimated for from the first samples. The others start at zero.
@@ -43,6 +45,19 @@ pub(crate) fn sensitivities(
     parameters: &[usize],
     states: &[usize],
 ) -> Sensitivities {
+    sensitivities_with(None, model, values, x0, run, parameters, states)
+}
+
+/// As [`sensitivities`], with the positions as measured where they are given.
+pub(crate) fn sensitivities_with(
+    positions: Option<&Positions>,
+    model: &Model,
+    values: &[f64],
+    x0: &[f64],
+    run: &Run,
+    parameters: &[usize],
+    states: &[usize],
+) -> Sensitivities {
     let columns = parameters.len() + states.len();
     let rows = run.len() * model.measured.len();
     let mut predicted = vec![0.0; rows];
@@ -72,7 +87,8 @@ pub(crate) fn sensitivities(
             })
             .collect();
         let mut simulator = Simulator::new(model, &dual_values);
-        free_run(&mut simulator, &dual_x0, run, |k, outputs| {
+        let n = model.measured.len();
+        run_with(positions, &mut simulator, &dual_x0, run, n, |k, outputs| {
             for (i, output) in outputs.iter().enumerate() {
                 let row = k * outputs.len() + i;
                 predicted[row] = output.value();
@@ -90,9 +106,21 @@ pub(crate) fn sensitivities(
 
 /// The free run over `run`, without derivatives; row by row as in [`Sensitivities::predicted`].
 pub(crate) fn predict(model: &Model, values: &[f64], x0: &[f64], run: &Run) -> Vec<f64> {
-    let mut predicted = Vec::with_capacity(run.len() * model.measured.len());
+    predict_with(None, model, values, x0, run)
+}
+
+/// As [`predict`], with the positions as measured where they are given.
+pub(crate) fn predict_with(
+    positions: Option<&Positions>,
+    model: &Model,
+    values: &[f64],
+    x0: &[f64],
+    run: &Run,
+) -> Vec<f64> {
+    let n = model.measured.len();
+    let mut predicted = Vec::with_capacity(run.len() * n);
     let mut simulator = Simulator::new(model, values);
-    free_run(&mut simulator, x0, run, |_, outputs| {
+    run_with(positions, &mut simulator, x0, run, n, |_, outputs| {
         predicted.extend_from_slice(outputs)
     });
     predicted

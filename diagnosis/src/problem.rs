@@ -14,7 +14,10 @@ use nalgebra::{DMatrix, DVector};
 use crate::fit::{FitError, FitSettings};
 use crate::flatness::{DEAD, Named};
 use crate::noise::Block;
-use crate::prediction::{InitialStates, estimated_states, predict, residuals, sensitivities};
+use crate::positions::Positions;
+use crate::prediction::{
+    InitialStates, estimated_states, predict_with, residuals, sensitivities_with,
+};
 use crate::regression::batch;
 use crate::score::Tally;
 
@@ -47,6 +50,8 @@ pub(crate) struct Problem<'a> {
     seen: Option<&'a [Vec<bool>]>,
     /// Initial states that are not estimated, by run.
     held: Option<Vec<DVector<f64>>>,
+    /// The positions are as measured, not simulated.
+    pub(crate) positions: Option<Positions>,
 }
 
 /// How hard a fit tries.
@@ -159,6 +164,7 @@ impl<'a> Problem<'a> {
             samples,
             seen,
             held,
+            positions: None,
         })
     }
 
@@ -309,7 +315,8 @@ impl<'a> Problem<'a> {
         let (values, states) = self.unpack(scaled);
         let mut all = Vec::with_capacity(self.rows());
         for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
-            let predicted = predict(self.model, &values, x0.as_slice(), run);
+            let positions = self.positions.as_ref();
+            let predicted = predict_with(positions, self.model, &values, x0.as_slice(), run);
             let mut residual = residuals(&predicted, run);
             for (row, value) in residual.iter_mut().enumerate() {
                 *value *= self.weight(index, row);
@@ -335,7 +342,9 @@ impl<'a> Problem<'a> {
         let mut first_row = 0;
         for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
             let x0 = x0.as_slice();
-            let s = sensitivities(self.model, &values, x0, run, &self.free, &self.visible);
+            let positions = self.positions.as_ref();
+            let (free, visible) = (&self.free, &self.visible);
+            let s = sensitivities_with(positions, self.model, &values, x0, run, free, visible);
             let residual = residuals(&s.predicted, run);
             for row in 0..residual.len() {
                 let finite = run.measured[row].is_finite();

@@ -1,0 +1,122 @@
+//! The free run with the positions as they were measured.
+
+use loopsight_core::model::{Model, pseudo_inverse};
+use loopsight_core::registry::HostReal;
+use loopsight_core::run::Run;
+use loopsight_core::simulate::{Simulator, free_run};
+use loopsight_core::{EffectMeta, Role};
+use nalgebra::DMatrix;
+
+/// Keeps the integrals of the plant (angles, ways) where the measurement has them, while the speeds
+/// run free.
+///
+/// ```text
+/// q(k) += J (y(k) - ŷ(k))        J = H_q⁺ where q is measured, Δt H_v⁺ where its rate v is
+/// ```
+///
+/// with `H` the sensitivity of the measured signals to the state. An effect that reads a position
+/// (cogging, a pendulum's weight, a spring) makes the free run a maze: a model that is a little
+/// wrong has turned half a cog too far after some seconds, and the error has a minimum for each
+/// cog. With the positions as measured the effect is a known function of time, the error has one
+/// minimum, and the free run starts from there. (As an observer of which only the positions are
+/// corrected; H. D. I. Abarbanel, D. R. Creveling, R. Farsian, M. Kostuk, 2009, "Dynamical state
+/// and parameter estimation", SIAM J. Applied Dynamical Systems 8, 1341–1381, for the idea.)
+#[derive(Clone, Debug)]
+pub(crate) struct Positions {
+    /// Corrections by state: its index, and one factor per measured signal.
+    direct: Vec<(usize, Vec<f64>)>,
+    /// The same, times the sampling interval.
+    by_rate: Vec<(usize, Vec<f64>)>,
+}
+
+impl Positions {
+    /// Whether an effect reads one.
+    pub(crate) fn matter_to(meta: &EffectMeta) -> bool {
+        let position = |role: &Role| matches!(role, Role::Position | Role::Shaft | Role::Heading);
+        meta.reads.iter().any(position)
+    }
+
+    /// The positions that the measured signals of `model` tell; none where they tell none, or where
+    /// a sensor looks back at a position and would see it jump.
+    pub(crate) fn of(model: &Model, values: &[f64]) -> Option<Self> {
+        if model.effects.iter().any(|e| e.meta.memory) {
+            return None;
+        }
+        let (jacobian, _) = model.measurement_jacobian(values, &vec![0.0; model.n_states()]);
+        let inverse: DMatrix<f64> = pseudo_inverse(&jacobian)?;
+        let state = |id: &str| model.plant.states.iter().position(|s| s.id == id);
+        let row = |i: usize| -> Option<Vec<f64>> {
+            let row: Vec<f64> = inverse.row(i).iter().copied().collect();
+            row.iter().any(|v| *v != 0.0).then_some(row)
+        };
+        let mut positions = Self {
+            direct: Vec::new(),
+            by_rate: Vec::new(),
+        };
+        for (rate, integral) in model.plant.integrals {
+            let Some(integral) = state(integral) else {
+                continue;
+            };
+            if let Some(row) = row(integral) {
+                positions.direct.push((integral, row));
+            } else if let Some(row) = state(rate).and_then(row) {
+                positions.by_rate.push((integral, row));
+            }
+        }
+        (!positions.direct.is_empty() || !positions.by_rate.is_empty()).then_some(positions)
+    }
+
+    /// As [`free_run`], the positions corrected after each sample.
+    pub(crate) fn run<S: HostReal>(
+        &self,
+        simulator: &mut Simulator<'_, S>,
+        x0: &[S],
+        run: &Run,
+        n_measured: usize,
+        mut each: impl FnMut(usize, &[S]),
+    ) {
+        let Some(&start) = run.time.first() else {
+            return;
+        };
+        let mut predicted = vec![S::zero(); n_measured];
+        simulator.reset(x0, run.input(0));
+        for k in 0..run.len() {
+            let mut interval = 0.0;
+            if k > 0 {
+                interval = run.time[k] - run.time[k - 1];
+                simulator.advance(run.time[k] - start, run.input(k - 1));
+            }
+            simulator.measure(&mut predicted);
+            each(k, &predicted);
+            let corrections = [(&self.direct, 1.0), (&self.by_rate, interval)];
+            for (rows, factor) in corrections {
+                for (state, row) in rows {
+                    for ((y, p), gain) in run.sample(k).iter().zip(&predicted).zip(row) {
+                        if y.is_finite() {
+                            let step = (S::of(*y) - *p) * S::of(gain * factor);
+                            simulator.state_mut()[*state] += step;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The free run, with the positions as measured where they are given.
+pub(crate) fn run_with<S: HostReal>(
+    positions: Option<&Positions>,
+    simulator: &mut Simulator<'_, S>,
+    x0: &[S],
+    run: &Run,
+    n_measured: usize,
+    each: impl FnMut(usize, &[S]),
+) {
+    match positions {
+        // An observer holds the positions as well.
+        Some(positions) if run.observer.is_none() => {
+            positions.run(simulator, x0, run, n_measured, each);
+        }
+        _ => free_run(simulator, x0, run, each),
+    }
+}
