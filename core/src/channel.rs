@@ -66,8 +66,8 @@ pub enum Role {
     Forward,
     /// Yaw rate of a vehicle, where the channel acts about the vertical.
     Yaw,
-    /// Load on the common supply: the sum of the magnitudes of the currents, or of what stands for
-    /// them.
+    /// Load on the common supply: the sum over the motors of command times voltage over the winding,
+    /// V². Over winding resistance and supply voltage it is the current drawn.
     Load,
     /// Voltage over the winding of this channel's motor, proportional to its current.
     Armature,
@@ -75,11 +75,13 @@ pub enum Role {
     Centrifugal,
     /// Angle of a shaft with a motor or an encoder: what is uneven there repeats with its turns.
     Shaft,
+    /// What [`Role::Load`] would be with the motors at rest: the sum of the squares of the commands.
+    Stall,
 }
 
 impl Role {
     /// Number of roles.
-    pub const COUNT: usize = 10;
+    pub const COUNT: usize = 11;
     /// All of them, in order.
     pub const ALL: [Role; Role::COUNT] = [
         Role::Flow,
@@ -92,6 +94,7 @@ impl Role {
         Role::Armature,
         Role::Centrifugal,
         Role::Shaft,
+        Role::Stall,
     ];
 
     /// Name used in messages.
@@ -107,6 +110,7 @@ impl Role {
             Role::Armature => "armature voltage",
             Role::Centrifugal => "acceleration by turning",
             Role::Shaft => "shaft angle",
+            Role::Stall => "supply load at rest",
         }
     }
 }

@@ -3,7 +3,7 @@
 use loopsight_core::model::{Model, misfit};
 use loopsight_core::registry;
 use loopsight_core::sensor::Sensor;
-use loopsight_core::{Channel, EffectMeta, Place, Role};
+use loopsight_core::{Channel, EffectMeta, Parameter, Place, Role};
 
 /// An effect at a set of channels.
 #[derive(Clone, Debug)]
@@ -31,6 +31,12 @@ impl Candidate {
                 parameter.free || !parameter.declaration.starts.is_empty()
             })
             .count()
+    }
+
+    /// The candidate with its sign smoothed over less; none where it has no sign.
+    pub(crate) fn sharp(&self) -> Option<Self> {
+        let mut sharp = self.clone();
+        smooth(&mut sharp.model, sharp.meta, SHARP * sharp.flow).then_some(sharp)
     }
 
     /// The candidate with the values of `start` for those of its parameters that are not estimated.
@@ -77,8 +83,10 @@ pub(crate) fn candidates(model: &Model, rms: &[f64]) -> Vec<Candidate> {
     found
 }
 
-/// Share of the flow over which a sign is smoothed.
+/// Share of the flow over which a sign is smoothed: wide enough for a fit to find its way.
 const WIDTH: f64 = 0.02;
+/// The same in a final fit, which starts near its end: what sticks, sticks.
+const SHARP: f64 = 0.004;
 
 /// Gives the last effect of `model` the widths that suit the recording; returns the root mean
 /// square of the flow at its channels.
@@ -92,13 +100,28 @@ pub(crate) fn suit(model: &mut Model, meta: &EffectMeta, rms: &[f64]) -> f64 {
         .filter_map(|c| model.find_signal(c.read(Role::Flow)?).ok())
         .filter_map(|i| rms.get(i).copied())
         .fold(0.0, f64::max);
-    let first = effect.first_parameter;
+    smooth(model, meta, WIDTH * flow);
+    flow
+}
+
+/// Whether a parameter is a speed over which a sign is smoothed.
+pub(crate) fn is_width(declaration: &Parameter) -> bool {
+    declaration.unit == "flow" && !declaration.estimated
+}
+
+/// Gives the last effect of `model` this width, where it has one; says whether it has.
+pub(crate) fn smooth(model: &mut Model, meta: &EffectMeta, width: f64) -> bool {
+    let Some(first) = model.effects.last().map(|e| e.first_parameter) else {
+        return false;
+    };
+    let mut has = false;
     for (i, declaration) in meta.parameters.iter().enumerate() {
-        if declaration.unit == "flow" && !declaration.estimated && flow > 0.0 {
-            model.parameters[first + i].value = Some(WIDTH * flow);
+        if is_width(declaration) && width > 0.0 {
+            model.parameters[first + i].value = Some(width);
+            has = true;
         }
     }
-    flow
+    has
 }
 
 pub(crate) fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<&'static str>> {

@@ -33,6 +33,8 @@ const FINALISTS: usize = 9;
 const LOOKED_AT: usize = 36;
 /// Starts of one candidate that are looked at.
 const STARTS: usize = 2;
+/// Most starts of a candidate that is looked at from where a simpler one ended.
+const GROWN: usize = 3;
 /// Places of one effect among the finalists.
 const SIBLINGS: usize = 2;
 /// Effort of a first look at a candidate.
@@ -139,7 +141,7 @@ pub(crate) fn diagnose_above(
         .iter()
         .enumerate()
         .flat_map(|(i, c)| {
-            starts(c, &nominal, duration)
+            starts(c, &nominal.values, &BTreeMap::new(), duration)
                 .into_iter()
                 .map(move |start| (i, start))
         })
@@ -172,6 +174,7 @@ pub(crate) fn diagnose_above(
             Some((*i, found?))
         })
         .collect();
+    looked.extend(grown(&all, &looked, &holdout, &nominal, duration));
     looked.sort_by(|a, b| nrmse(&a.1.rank).total_cmp(&nrmse(&b.1.rank)));
     let mut judged: Vec<Judged> = Vec::new();
     for k in 0..looked.len() {
@@ -206,7 +209,21 @@ pub(crate) fn diagnose_above(
 
     let mut finalists: Vec<(Judged, Fit)> = judged
         .into_par_iter()
-        .filter_map(|first| finish(first, &holdout, &nominal))
+        .filter_map(|first| {
+            // What sticks is fitted sharply, unless the machine does not stick so.
+            let sharp = first.candidate.sharp().and_then(|candidate| {
+                let first = Judged {
+                    candidate,
+                    ..first.clone()
+                };
+                finish(first, &holdout, &nominal)
+            });
+            let good = |(sharp, _): &(Judged, Fit)| nrmse(&sharp.rank) < nrmse(&first.rank);
+            match sharp {
+                Some(sharp) if good(&sharp) => Some(sharp),
+                _ => finish(first, &holdout, &nominal),
+            }
+        })
         .collect();
     finalists.sort_by(|a, b| nrmse(&a.0.rank).total_cmp(&nrmse(&b.0.rank)));
 
@@ -293,15 +310,61 @@ fn refused(verdict: Conclusion, faults: &[Fault], advice: Vec<Advice>) -> Diagno
 /// Shares of the flow that a speed to be estimated starts from.
 const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
 
-/// Values to start a candidate from: the nominal ones, and its own a noticeable step from neutral.
-fn starts(candidate: &Candidate, nominal: &Solution, duration: f64) -> Vec<Vec<f64>> {
-    let mut all = vec![nominal.values.clone()];
+/// Looks at candidates that contain a simpler one from where the simpler one ended: strong
+/// breakaway friction is found from dry friction, not from none.
+fn grown(
+    all: &[Candidate],
+    looked: &[(usize, Judged)],
+    holdout: &Holdout<'_>,
+    nominal: &Solution,
+    duration: f64,
+) -> Vec<(usize, Judged)> {
+    let mut attempts: Vec<(usize, Vec<f64>)> = Vec::new();
+    for (i, candidate) in all.iter().enumerate() {
+        let simpler = looked
+            .iter()
+            .filter(|(j, _)| {
+                candidate.meta.simpler.contains(&all[*j].meta.id) && candidate.at == all[*j].at
+            })
+            .min_by(|a, b| nrmse(&a.1.rank).total_cmp(&nrmse(&b.1.rank)));
+        let Some((j, found)) = simpler else { continue };
+        let own = all[*j].own();
+        let values = &found.solution.values;
+        let known: BTreeMap<&str, f64> = all[*j]
+            .meta
+            .parameters
+            .iter()
+            .zip(&values[own.clone()])
+            .map(|(declaration, value)| (declaration.id, *value))
+            .collect();
+        let starts = starts(candidate, &values[..own.start], &known, duration);
+        if starts.len() <= GROWN {
+            attempts.extend(starts.into_iter().map(|start| (i, start)));
+        }
+    }
+    attempts
+        .par_iter()
+        .filter_map(|(i, start)| Some((*i, look(&all[*i].chosen(start), start, holdout, nominal)?)))
+        .collect()
+}
+
+/// Values to start a candidate from: those of the rest of the model from `base`, its own as `known`,
+/// else a noticeable step from neutral.
+fn starts(
+    candidate: &Candidate,
+    base: &[f64],
+    known: &BTreeMap<&str, f64>,
+    duration: f64,
+) -> Vec<Vec<f64>> {
+    let mut all = vec![base.to_vec()];
     for i in candidate.own() {
         let parameter = &candidate.model.parameters[i];
         let nearest = |value: f64| parameter.declaration.nearest(value);
         let neutral = parameter.value.unwrap_or(0.0);
         let listed = parameter.starts(duration);
-        let values: Vec<f64> = if !parameter.free && listed.is_empty() {
+        let values: Vec<f64> = if let Some(value) = known.get(parameter.declaration.id) {
+            vec![*value]
+        } else if !parameter.free && listed.is_empty() {
             vec![neutral]
         } else if parameter.free && parameter.declaration.unit == "flow" && candidate.flow > 0.0 {
             FLOW_STARTS

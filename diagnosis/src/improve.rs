@@ -5,6 +5,7 @@ use loopsight_core::run::Run;
 use loopsight_recordings::Fault;
 use serde::Serialize;
 
+use crate::candidates::{is_width, smooth};
 use crate::conclusion::{Conclusion, Diagnosis, Place};
 use crate::diagnose::{LEAST, diagnose_above};
 use crate::fit::{Fit, FitError, FitSettings, fit};
@@ -84,7 +85,12 @@ pub fn improve(
             nrmse_fit: best.nrmse_fit,
             nrmse_test: best.nrmse,
         });
-        present = simplified(best.model, runs, test, faults)?;
+        present = sharpened(
+            simplified(best.model, runs, test, faults)?,
+            runs,
+            test,
+            faults,
+        )?;
     };
     let best = match verdict {
         Conclusion::LogFaulty | Conclusion::DataInsufficient => None,
@@ -113,14 +119,7 @@ fn simplified(
     test: Option<&[Run]>,
     faults: &[Fault],
 ) -> Result<Model, FitError> {
-    let error = |m: &Model| -> Result<(f64, Model), FitError> {
-        let settings = FitSettings {
-            max_iterations: 20,
-            ..FitSettings::default()
-        };
-        let fitted = fit(m, runs, test, faults, &settings, &|_, _| {})?;
-        Ok((fitted.comparison.nrmse, fitted.model))
-    };
+    let error = |m: &Model| refitted(m, runs, test, faults);
     let mut best = model;
     let mut least = None;
     for index in 0..best.effects.len() {
@@ -146,3 +145,57 @@ fn simplified(
 
 /// How much the error may grow for a simpler explanation.
 const SIMPLER: f64 = 1.02;
+
+/// The error of a model after a short fit, and the fitted model.
+fn refitted(
+    model: &Model,
+    runs: &[Run],
+    test: Option<&[Run]>,
+    faults: &[Fault],
+) -> Result<(f64, Model), FitError> {
+    let settings = FitSettings {
+        max_iterations: 20,
+        ..FitSettings::default()
+    };
+    let fitted = fit(model, runs, test, faults, &settings, &|_, _| {})?;
+    Ok((fitted.comparison.nrmse, fitted.model))
+}
+
+/// How much the error must fall for a sign to be smoothed over half as much.
+const SHARPER: f64 = 0.99;
+/// Most halvings.
+const HALVINGS: usize = 3;
+
+/// The sign of the effect added last is smoothed over less and less while the error falls by it.
+fn sharpened(
+    model: Model,
+    runs: &[Run],
+    test: Option<&[Run]>,
+    faults: &[Fault],
+) -> Result<Model, FitError> {
+    let mut best = model;
+    let mut least = None;
+    for _ in 0..HALVINGS {
+        let mut candidate = best.clone();
+        let Some(effect) = candidate.effects.last() else {
+            break;
+        };
+        let (meta, first) = (effect.meta, effect.first_parameter);
+        let width = (0..meta.parameters.len())
+            .find(|i| is_width(&meta.parameters[*i]))
+            .and_then(|i| candidate.parameters[first + i].value);
+        let Some(width) = width else { break };
+        smooth(&mut candidate, meta, 0.5 * width);
+        let now = match least {
+            Some(now) => now,
+            None => refitted(&best, runs, test, faults)?.0,
+        };
+        least = Some(now);
+        let (after, fitted) = refitted(&candidate, runs, test, faults)?;
+        if after.is_nan() || after > SHARPER * now {
+            break;
+        }
+        (best, least) = (fitted, Some(after));
+    }
+    Ok(best)
+}

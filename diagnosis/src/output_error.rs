@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use loopsight_core::model::Model;
 use loopsight_core::run::Run;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::compare::Comparison;
@@ -123,6 +123,30 @@ fn first_values(model: &Model, runs: &[Run], settings: &FitSettings) -> Option<V
     }
 }
 
+/// Rows of a Jacobian beyond this multiple of the median row are cut to it.
+const STEEP: f64 = 100.0;
+
+/// A shaft about to break loose is a switch: at that instant the free run answers to its parameters
+/// without bound, all of them alike, and one such row would hide what the others tell.
+fn limit_rows(jacobian: &mut DMatrix<f64>) {
+    let mut norms: Vec<f64> = jacobian
+        .row_iter()
+        .map(|row| row.norm())
+        .filter(|norm| *norm > 0.0)
+        .collect();
+    if norms.is_empty() {
+        return;
+    }
+    let middle = norms.len() / 2;
+    let limit = STEEP * *norms.select_nth_unstable_by(middle, f64::total_cmp).1;
+    for mut row in jacobian.row_iter_mut() {
+        let norm = row.norm();
+        if norm > limit {
+            row *= limit / norm;
+        }
+    }
+}
+
 impl Problem<'_> {
     /// What is said of a solution.
     pub(crate) fn result(&self, solution: &DVector<f64>) -> Fit {
@@ -136,7 +160,8 @@ impl Problem<'_> {
                 }
             }
         }
-        let (residual, jacobian) = self.linearise(solution);
+        let (residual, mut jacobian) = self.linearise(solution);
+        limit_rows(&mut jacobian);
         let gram = jacobian.tr_mul(&jacobian);
         let norms: Vec<f64> = (0..gram.ncols()).map(|i| gram[(i, i)].sqrt()).collect();
         let quantile = StudentsT::new(0.0, 1.0, (self.samples - norms.len() as f64).max(1.0))

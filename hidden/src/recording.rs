@@ -6,7 +6,7 @@ use loopsight_core::run::Run;
 use loopsight_recordings::write_csv;
 
 use crate::error::HiddenError;
-use crate::experiment::{DURATION, Experiment, PERIOD, SAMPLES};
+use crate::experiment::{Experiment, PERIOD, SAMPLES};
 use crate::hide::hide;
 use crate::machine::{Machine, STEP};
 use crate::motor::COPPER;
@@ -115,14 +115,10 @@ pub fn record_with(
     for concealed in &mut hidden {
         if concealed.effect == Hidden::WindingHeating {
             let rises = machine.warmth().map(|t| COPPER * t);
-            let mean = rises[..drives].iter().sum::<f64>() / drives as f64;
-            let quantity = |name, value, unit| Quantity { name, value, unit };
-            concealed
-                .fitted
-                .push(quantity("rate", mean / DURATION, "1/s"));
             let names = ["rise_at_end_right", "rise_at_end_left"];
-            for (name, rise) in names.into_iter().zip(&rises[..drives]) {
-                concealed.physical.push(quantity(name, *rise, "1"));
+            for (name, value) in names.into_iter().zip(rises[..drives].iter().copied()) {
+                let unit = "1";
+                concealed.physical.push(Quantity { name, value, unit });
             }
         }
     }

@@ -108,11 +108,12 @@ const PHYSICAL: [Parameter; 7] = [
     .scaled(1e-5),
 ];
 
-const MOTOR: [Reads; 6] = [
+const MOTOR: [Reads; 7] = [
     Reads(Role::Flow, "speed"),
     Reads(Role::Position, "angle"),
     Reads(Role::Drive, "voltage"),
     Reads(Role::Load, "supply_load"),
+    Reads(Role::Stall, "stall_load"),
     Reads(Role::Armature, "armature"),
     Reads(Role::Shaft, "angle"),
 ];
@@ -186,7 +187,7 @@ const CHANNELS: [Channel; 6] = [
     },
 ];
 
-impl Plant<2, 1, 2, 2, 2> for DcAxis {
+impl Plant<2, 1, 2, 2, 3> for DcAxis {
     const META: PlantMeta = PlantMeta {
         id: "dc_axis",
         summary: "an axis driven by one DC motor",
@@ -202,9 +203,15 @@ impl Plant<2, 1, 2, 2, 2> for DcAxis {
         outputs: &[
             Signal::new(
                 "supply_load",
-                "|U|",
-                "V",
-                "load on the supply: magnitude of the armature voltage",
+                "V U",
+                "V^2",
+                "load on the supply: command times armature voltage",
+            ),
+            Signal::new(
+                "stall_load",
+                "V²",
+                "V^2",
+                "load on the supply if the motor stood still",
             ),
             Signal::new(
                 "armature",
@@ -237,7 +244,8 @@ impl Plant<2, 1, 2, 2, 2> for DcAxis {
             u[0]
         };
         match index {
-            0 => armature.abs(),
+            0 => u[0] * armature,
+            1 => u[0] * u[0],
             _ => armature,
         }
     }
@@ -261,7 +269,7 @@ impl ControlAffine<1, 1, 2> for DcAxis {
     }
 }
 
-declare_plant!(DcAxis, "dc_axis", <2, 1, 2, 2, 2>);
+declare_plant!(DcAxis, "dc_axis", <2, 1, 2, 2, 3>);
 
 #[cfg(test)]
 mod tests {

@@ -104,7 +104,7 @@ impl Ddmr {
     }
 }
 
-impl Plant<6, 2, 4, 8, 11> for Ddmr {
+impl Plant<6, 2, 4, 8, 12> for Ddmr {
     const META: PlantMeta = PlantMeta {
         id: "ddmr",
         summary: "differential-drive mobile robot with two DC motors",
@@ -154,11 +154,12 @@ impl Plant<6, 2, 4, 8, 11> for Ddmr {
             5 => (travel - half_track * heading) / wheel_radius,
             6 => {
                 let [right, left] = armature(x, u, p);
-                right.abs() + left.abs()
+                u[0] * right + u[1] * left
             }
-            7 => armature(x, u, p)[0],
-            8 => armature(x, u, p)[1],
-            9 => omega * omega,
+            7 => u[0] * u[0] + u[1] * u[1],
+            8 => armature(x, u, p)[0],
+            9 => armature(x, u, p)[1],
+            10 => omega * omega,
             _ => -v * omega,
         }
     }
@@ -218,7 +219,7 @@ impl ControlAffine<2, 2, 8> for Ddmr {
     }
 }
 
-declare_plant!(Ddmr, "ddmr", <6, 2, 4, 8, 11>);
+declare_plant!(Ddmr, "ddmr", <6, 2, 4, 8, 12>);
 
 #[cfg(test)]
 mod tests {

@@ -64,23 +64,20 @@ pub(super) fn asymmetry(m: &mut Physics, mut of: Concealed) -> Concealed {
     of.fitted("difference", share, "1")
 }
 
-/// An internal resistance of 2 Ohm behind 12 V. As a share of the supply per volt over a winding that
-/// is `duty R_i/(R V_oc)`: the value given is that of the duty of ±9 V.
+/// An internal resistance of 2 Ohm behind 12 V.
 pub(super) fn sag(m: &mut Physics, mut of: Concealed) -> Concealed {
     at_inputs(m, &mut of);
     let resistance = 2.0 * of.size;
     m.battery.resistance += resistance;
-    of.approximate = true;
     let supply = m.battery.open_circuit;
-    let share = 9.0 / supply * resistance / (m.motor.resistance * supply);
-    of.fitted("resistance", share, "1/V")
+    let share = resistance / (m.motor.resistance * supply.powi(2));
+    of.fitted("resistance", share, "1/V^2")
         .physical("internal_resistance", resistance, "Ohm")
         .physical("winding_resistance", m.motor.resistance, "Ohm")
         .physical("open_circuit_voltage", supply, "V")
 }
 
-/// Windings that hold 0.45 J/K: within 25 s of PRBS their resistance grows by a sixth. The fitted
-/// effect grows evenly with time: its rate is the mean one of the recording.
+/// Windings that hold 0.45 J/K: within 25 s of PRBS their resistance grows by a sixth.
 pub(super) fn heating(m: &mut Physics, mut of: Concealed) -> Concealed {
     at_inputs(m, &mut of);
     let heat = Heat {
@@ -88,8 +85,10 @@ pub(super) fn heating(m: &mut Physics, mut of: Concealed) -> Concealed {
         resistance: 60.0 * of.size,
     };
     m.heat = Some(heat);
-    of.approximate = true;
-    of.physical("heat_capacity", heat.capacity, "J/K")
+    let heating = COPPER / (heat.capacity * m.motor.resistance);
+    of.fitted("heating", heating, "1/V^2/s")
+        .fitted("cooling", 1.0 / (heat.capacity * heat.resistance), "1/s")
+        .physical("heat_capacity", heat.capacity, "J/K")
         .physical("thermal_resistance", heat.resistance, "K/W")
         .physical("temperature_coefficient", COPPER, "1/K")
 }

@@ -179,7 +179,7 @@ pub(super) const INPUTS: [Signal; 2] = [
     Signal::new("voltage_left", "V_l", "V", "voltage on the left motor"),
 ];
 
-pub(super) const OUTPUTS: [Signal; 11] = [
+pub(super) const OUTPUTS: [Signal; 12] = [
     Signal::new(
         "shaft_speed_right",
         "φ'_r",
@@ -220,9 +220,15 @@ pub(super) const OUTPUTS: [Signal; 11] = [
     ),
     Signal::new(
         "supply_load",
-        "Σ|U|",
-        "V",
-        "load on the common supply: sum of the magnitudes of the armature voltages",
+        "Σ V U",
+        "V^2",
+        "load on the common supply: commands times armature voltages",
+    ),
+    Signal::new(
+        "stall_load",
+        "Σ V²",
+        "V^2",
+        "load on the common supply if the motors stood still",
     ),
     Signal::new(
         "armature_right",
@@ -257,21 +263,23 @@ pub(super) const INTEGRALS: [(&str, &str); 4] = [
     ("shaft_speed_left", "shaft_angle_left"),
 ];
 
-pub(super) const WHEEL_RIGHT: [Reads; 7] = [
+pub(super) const WHEEL_RIGHT: [Reads; 8] = [
     Reads(Role::Flow, "shaft_speed_right"),
     Reads(Role::Position, "shaft_angle_right"),
     Reads(Role::Drive, "voltage_right"),
     Reads(Role::Heading, "heading"),
     Reads(Role::Load, "supply_load"),
+    Reads(Role::Stall, "stall_load"),
     Reads(Role::Armature, "armature_right"),
     Reads(Role::Shaft, "shaft_angle_right"),
 ];
-pub(super) const WHEEL_LEFT: [Reads; 7] = [
+pub(super) const WHEEL_LEFT: [Reads; 8] = [
     Reads(Role::Flow, "shaft_speed_left"),
     Reads(Role::Position, "shaft_angle_left"),
     Reads(Role::Drive, "voltage_left"),
     Reads(Role::Heading, "heading"),
     Reads(Role::Load, "supply_load"),
+    Reads(Role::Stall, "stall_load"),
     Reads(Role::Armature, "armature_left"),
     Reads(Role::Shaft, "shaft_angle_left"),
 ];

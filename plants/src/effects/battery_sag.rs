@@ -7,22 +7,28 @@ use loopsight_core::{
 /// Battery sag: the supply falls with the current that all motors take, and every command with it.
 ///
 /// ```text
-/// u_effective = u / (1 + resistance · load)
+/// u_effective = u s          s = 1 - resistance · max(0, Σ u (s u - e))
+///                              = 1 - resistance · max(0, load)/(1 + resistance · stall)
 /// ```
 ///
 /// | symbol | what | unit |
 /// |---|---|---|
-/// | `u` | the command: a fraction of the supply, written as the voltage it would be nominally | that of the channel |
-/// | `load` | sum of the magnitudes of the voltages over all windings, proportional to the currents | V |
-/// | `resistance` | share of the supply lost per volt of load: internal resistance of the battery over that of a winding, over the nominal supply | 1/V |
+/// | `u` | the command: a share of the supply, written as the voltage it would be nominally | that of the channel |
+/// | `e` | back-emf | V |
+/// | `load` | `Σ u (u - e)`: what the commands would draw from a stiff supply, times winding resistance | V² |
+/// | `stall` | `Σ u²`: the same with the motors at rest | V² |
+/// | `resistance` | share of the supply lost per V² of load: internal resistance of the battery over that of a winding and the square of the nominal supply | 1/V² |
 ///
-/// Assumptions: the load is taken at the nominal commands, and the division stands for the
-/// feedback that a lower supply lowers the currents (to first order it is `u - resistance · load ·
-/// u`); the supply feels the motor currents themselves, not their duty cycle; the battery has no
-/// memory (no diffusion, no state of charge).
+/// A winding draws `(s u - e)/R` while its switch is closed, `u` over the supply of the time; the
+/// lower supply lowers the current, which is the denominator.
+///
+/// Assumptions: equal windings; load at the nominal commands, before other effects on them; nothing
+/// is fed back (the supply only falls); the battery has no memory (no diffusion, no state of
+/// charge).
 ///
 /// Reference: G. L. Plett (2015), "Battery Management Systems, Volume 1: Battery Modeling", Artech
-/// House, chapter 2, equivalent series resistance.
+/// House, chapter 2, equivalent series resistance; N. Mohan, T. M. Undeland, W. P. Robbins (2003),
+/// "Power Electronics", 3rd edition, Wiley, section 7-7, mean input current of a full bridge.
 #[derive(Clone, Copy, Debug)]
 pub struct BatterySag;
 
@@ -32,27 +38,32 @@ impl Effect<1, 0> for BatterySag {
         summary: "the supply falls with the total current, and every command with it",
         symptom: "one motor alone is right, both together are short; the shortfall is worst when accelerating or reversing and vanishes at speed",
         remedy: "measure the supply and divide the command by it; a stronger or warmer battery, thicker cables",
-        equation: "u_effective = u / (1 + resistance load)",
-        reference: "Plett (2015), Battery Management Systems, Volume 1, chapter 2 (equivalent series resistance)",
-        example: "[[effect]]\n[effect.battery_sag]\nat = [\"input.right\", \"input.left\"]\nresistance = 0.01\n",
+        equation: "u_effective = u (1 - resistance max(0, load)/(1 + resistance stall)), load = sum of u (u - e), stall = sum of u^2",
+        reference: "Plett (2015), Battery Management Systems, Volume 1, chapter 2 (equivalent series resistance); Mohan, Undeland, Robbins (2003), Power Electronics, 3rd ed., section 7-7",
+        example: "[[effect]]\n[effect.battery_sag]\nat = [\"input.right\", \"input.left\"]\nresistance = 0.001\n",
         places: &[PlaceKind::Input],
-        reads: &[Role::Load],
+        reads: &[Role::Load, Role::Stall],
         shared_only: true,
         parameters: &[Parameter::new(
             "resistance",
             "κ",
-            "1/V",
-            "share of the supply lost per volt of load",
+            "1/V^2",
+            "share of the supply lost per square volt of load",
         )
         .within(0.0, 1.0)
         .or(0.0)
-        .scaled(0.01)],
+        .nonlinear()
+        .scaled(0.001)],
         ..EffectMeta::PLAIN
     };
 
     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 1]) -> S {
-        let loss = p[0] * at.get(Role::Load);
-        -at.nominal * loss / (S::one() + loss)
+        let load = at.get(Role::Load);
+        if load > S::zero() {
+            -at.nominal * p[0] * load / (S::one() + p[0] * at.get(Role::Stall))
+        } else {
+            S::zero()
+        }
     }
 }
 
@@ -64,17 +75,26 @@ mod tests {
 
     use super::*;
 
+    /// Two motors at 8 V with 3 V and -2 V of back-emf: what is left solves the circuit.
     #[test]
     fn all_commands_fall_with_the_load() {
+        let (u, e, k) = (8.0, [3.0, -2.0], 0.002);
+        let load: f64 = e.iter().map(|e| u * (u - e)).sum();
         let at = Reading {
-            nominal: 8.0,
-            ..reading(&[(Role::Load, 10.0)])
+            nominal: u,
+            ..reading(&[(Role::Load, load), (Role::Stall, 2.0 * u * u)])
         };
-        let w: f64 = BatterySag::contribution(&at, &[], &[0.025]);
-        assert!((8.0 + w - 8.0 / 1.25).abs() < 1e-12);
+        let w: f64 = BatterySag::contribution(&at, &[], &[k]);
+        let s = (u + w) / u;
+        let drawn: f64 = e.iter().map(|e| u * (s * u - e)).sum();
+        assert!((s - (1.0 - k * drawn)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn braking_motors_do_not_lift_it() {
         let at = Reading {
-            nominal: 8.0,
-            ..reading(&[])
+            nominal: 2.0,
+            ..reading(&[(Role::Load, -10.0), (Role::Stall, 4.0)])
         };
         assert_eq!(BatterySag::contribution(&at, &[], &[0.025]), 0.0);
     }

@@ -1,20 +1,27 @@
 //! A load that is taken up or set down.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use loopsight_core::{
+    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
+};
 
 /// Payload change: from an unknown time on the mass and the inertia are others.
 ///
 /// ```text
-/// v' = nominal · (1/(1 + fraction · H(t)))          H(t) = ½ (1 + tanh((t - time)/width))
+/// m(t) = m (1 + fraction · H(t))          H(t) = ½ (1 + tanh((t - time)/width))
+/// v' = nominal/(1 + fraction H) - max(fraction, 0) H'/(1 + fraction H) · v
 /// ```
 ///
 /// | symbol | what | unit |
 /// |---|---|---|
 /// | `nominal` | the rate without the effect | that of the channel |
+/// | `v` | the speed | that of the channel's flow |
 /// | `fraction` | relative growth of the mass, or of the inertia of an axis | 1 |
 /// | `yaw_fraction` | relative growth of the inertia about the vertical of a vehicle | 1 |
 /// | `time` | when it changes, since the start of each run | s |
 /// | `width` | how long the change takes | s |
+///
+/// The load is at rest before it is taken up, and shares the momentum then; a load that is set down
+/// takes its momentum along.
 ///
 /// Assumptions: all forces stay as they are (a heavier robot that rubs harder is a friction beside
 /// it), the centre of mass stays over the axle; the inertia is all of it, rotors included; the
@@ -32,10 +39,11 @@ impl Effect<4, 0> for PayloadChange {
         summary: "from an unknown time on mass and inertia are others",
         symptom: "the model is right up to a moment and wrong from then on: it accelerates too fast (or too slowly) while its final speeds stay right",
         remedy: "estimate while running, with forgetting; tell the controller when a load is taken up",
-        equation: "rate = nominal/(1 + fraction H(t)), H(t) = (1 + tanh((t - time)/width))/2",
+        equation: "rate = (nominal - max(fraction, 0) H'(t) v)/(1 + fraction H(t)), H(t) = (1 + tanh((t - time)/width))/2",
         reference: "Newton (1687); Basseville, Nikiforov (1993), Detection of Abrupt Changes, chapter 1",
         example: "[[effect]]\n[effect.payload_change]\nat = [\"inertia.forward\", \"inertia.yaw\"]\nfraction = 0.3\nyaw_fraction = 0.2\ntime = 12.0\n",
         places: &[PlaceKind::Body],
+        reads: &[Role::Flow],
         shared_only: true,
         parameters: &[
             Parameter::new(
@@ -84,9 +92,15 @@ impl Effect<4, 0> for PayloadChange {
         } else {
             fraction
         };
-        let share = S::of(0.5) * (S::one() + ((S::of(at.time) - time) / width).tanh());
-        let growth = grown * share;
-        -at.nominal * growth / (S::one() + growth)
+        let ramp = ((S::of(at.time) - time) / width).tanh();
+        let half = S::of(0.5);
+        let growth = grown * half * (S::one() + ramp);
+        let taken_up = if grown > S::zero() {
+            grown * half * (S::one() - ramp * ramp) / width
+        } else {
+            S::zero()
+        };
+        -(at.nominal * growth + taken_up * at.get(Role::Flow)) / (S::one() + growth)
     }
 }
 
@@ -116,6 +130,25 @@ mod tests {
             };
             let rate: f64 = 2.0 + PayloadChange::contribution(&at, &[], &p);
             assert!((rate - expected).abs() < 1e-12, "{time} {side}");
+        }
+    }
+
+    /// Coasting, a load at rest that is taken up leaves the momentum as it was; one that is set
+    /// down leaves the speed.
+    #[test]
+    fn momentum_is_kept() {
+        for (fraction, expected) in [(0.25, 3.0 / 1.25), (-0.25, 3.0)] {
+            let p = [fraction, 0.0, 1.0, 0.05];
+            let mut v = 3.0;
+            for k in 0..20_000 {
+                let at = Reading {
+                    time: 1e-4 * f64::from(k),
+                    side: 1.0,
+                    ..reading(&[(Role::Flow, v)])
+                };
+                v += 1e-4 * PayloadChange::contribution(&at, &[], &p);
+            }
+            assert!((v - expected).abs() < 1e-3, "{v} {expected}");
         }
     }
 }
