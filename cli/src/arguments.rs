@@ -131,6 +131,9 @@ pub(crate) struct FitOptions {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
+    /// A further recording of the same machine to learn from, beside LOG; may be given again.
+    #[arg(long, value_name = "LOG3")]
+    pub(crate) also: Vec<PathBuf>,
     /// Judge the fitted model on this log, which it was not fitted to.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,
@@ -173,6 +176,9 @@ pub(crate) struct DiagnoseOptions {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
+    /// A further recording of the same machine to learn from, beside LOG; may be given again.
+    #[arg(long, value_name = "LOG3")]
+    pub(crate) also: Vec<PathBuf>,
     /// Judge on this log; without it, on parts of LOG that the fits do not see.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,
@@ -234,6 +240,9 @@ pub(crate) struct ImproveOptions {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
+    /// A further recording of the same machine to learn from, beside LOG; may be given again.
+    #[arg(long, value_name = "LOG3")]
+    pub(crate) also: Vec<PathBuf>,
     /// Judge on this log; without it, on parts of LOG that the fits do not see.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,

@@ -77,13 +77,34 @@ pub(crate) fn recording(model: &mut Model, path: &Path) -> Result<(Vec<Run>, Vec
     mapped(model, &log, path)
 }
 
-/// The runs of a test recording, which must measure what the log measures; its faults join those
-/// of the log.
+/// Joins further recordings of the same machine to the log.
+pub(crate) fn join(loaded: &mut Loaded, paths: &[PathBuf]) -> Result<(), Failure> {
+    for path in paths {
+        let mut runs = further(loaded, path)?;
+        let file = path.file_stem().unwrap_or_default().to_string_lossy();
+        for run in &mut runs {
+            run.name = if run.name.is_empty() {
+                file.to_string()
+            } else {
+                format!("{file} {}", run.name)
+            };
+        }
+        loaded.runs.extend(runs);
+    }
+    Ok(())
+}
+
+/// The runs of a test recording.
 pub(crate) fn test_runs(
     loaded: &mut Loaded,
     path: Option<&Path>,
 ) -> Result<Option<Vec<Run>>, Failure> {
-    let Some(path) = path else { return Ok(None) };
+    path.map(|path| further(loaded, path)).transpose()
+}
+
+/// The runs of another recording, which must measure what the log measures; its faults join those
+/// of the log.
+fn further(loaded: &mut Loaded, path: &Path) -> Result<Vec<Run>, Failure> {
     let mut model = loaded.model.clone();
     let (runs, faults) = recording(&mut model, path)?;
     if model.measured != loaded.model.measured {
@@ -94,7 +115,7 @@ pub(crate) fn test_runs(
         )));
     }
     loaded.faults.extend(faults);
-    Ok(Some(runs))
+    Ok(runs)
 }
 
 fn mapped(

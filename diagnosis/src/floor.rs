@@ -9,9 +9,12 @@ use crate::score::Tally;
 /// `nrmse` over all signals of a model without any fault.
 ///
 /// Counted encoders: the standard deviation of rounding, from their resolution
-/// ([`loopsight_core::sensor::Encoder::noise`]), and at least the noise of the differences below.
-/// Other sensors: third differences of the measurement, in which a smooth motion vanishes and white
-/// noise of variance `σ²` has the variance `20 σ²`; the median keeps jumps of the motion out.
+/// ([`loopsight_core::sensor::Encoder::noise`]). Other sensors: third differences of the
+/// measurement, in which a smooth motion vanishes and white noise of variance `σ²` has the variance
+/// `20 σ²`; the median keeps jumps of the motion out. A sensor that is read more often than it has
+/// something new (a bus that updates every 20 ms, a coarse scale) is late by anything between
+/// nothing and its hold time `h`: the differences are those of what is new, and the age adds
+/// `(rate · h)²/12`.
 pub(crate) fn floor(model: &Model, runs: &[Run]) -> f64 {
     let n = model.measured.len();
     let sum: f64 = model
@@ -35,26 +38,55 @@ pub(crate) fn floor(model: &Model, runs: &[Run]) -> f64 {
 pub(crate) fn noise(sensor: &Sensor, signal: usize, runs: &[Run]) -> (f64, f64) {
     let mut tally = Tally::default();
     let mut thirds = Vec::new();
+    let mut holds = Vec::new();
+    let mut rate = Tally::default();
     let mut period = f64::NAN;
     for run in runs {
-        let y = |k: usize| run.sample(k)[signal];
+        let mut news: Vec<(f64, f64)> = Vec::new();
         for k in 0..run.len() {
-            tally.add(y(k), y(k));
-            if k >= 3 {
-                let d = y(k) - 3.0 * y(k - 1) + 3.0 * y(k - 2) - y(k - 3);
-                if d.is_finite() {
-                    thirds.push(d.abs());
+            let (time, y) = (run.time[k], run.sample(k)[signal]);
+            tally.add(y, y);
+            let Some((before, last)) = news.last().copied() else {
+                if y.is_finite() {
+                    news.push((time, y));
                 }
+                continue;
+            };
+            if y.is_finite() && y != last {
+                holds.push(time - before);
+                news.push((time, y));
+            }
+        }
+        for w in news.windows(4) {
+            thirds.push((w[3].1 - 3.0 * w[2].1 + 3.0 * w[1].1 - w[0].1).abs());
+        }
+        for w in news.windows(2) {
+            // Over the time it took, each sample once.
+            let samples = ((w[1].0 - w[0].0) / run.median_period()).round().max(1.0);
+            for _ in 0..(samples as usize).min(run.len()) {
+                rate.add((w[1].1 - w[0].1) / (w[1].0 - w[0].0), 0.0);
             }
         }
         period = period.min(run.median_period());
     }
     let noise = match sensor {
         Sensor::EncoderCounts(encoder) => encoder.noise(period),
-        Sensor::Instantaneous | Sensor::IntervalMean => median(thirds) / 0.6745 / 20f64.sqrt(),
+        Sensor::Instantaneous | Sensor::IntervalMean => {
+            let white = median(thirds) / 0.6745 / 20f64.sqrt();
+            let hold = median(holds);
+            let age = if hold > HELD * period {
+                rate.rms() * hold / 12f64.sqrt()
+            } else {
+                0.0
+            };
+            white.hypot(age)
+        }
     };
     (noise, tally.std())
 }
+
+/// A sensor that has something new so many sampling periods apart is held in between.
+const HELD: f64 = 1.5;
 
 fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
@@ -62,4 +94,39 @@ fn median(mut values: Vec<f64>) -> f64 {
     }
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sine of amplitude 1 and 2 rad/s, read every 5 ms, new every 20 ms.
+    #[test]
+    fn a_held_sensor_is_as_good_as_its_age() {
+        let (hold, n) = (0.02, 8000);
+        let time: Vec<f64> = (0..n).map(|k| 0.005 * f64::from(k)).collect();
+        let late = |t: f64| (2.0 * (t / hold + 1e-9).floor() * hold).sin();
+        let measured: Vec<f64> = time.iter().map(|t| late(*t)).collect();
+        // What is left by the best model there is: the sine, as late as the sensor is on average.
+        let left: f64 = time
+            .iter()
+            .zip(&measured)
+            .map(|(t, y)| (y - (2.0 * (t - 0.0075)).sin()).powi(2))
+            .sum::<f64>()
+            / f64::from(n);
+        let run = Run {
+            time,
+            inputs: Vec::new(),
+            n_inputs: 0,
+            measured,
+            n_measured: 1,
+            ..Run::default()
+        };
+        let (noise, _) = noise(&Sensor::Instantaneous, 0, &[run]);
+        assert!(
+            (noise / left.sqrt() - 1.0).abs() < 0.1,
+            "{noise} {}",
+            left.sqrt()
+        );
+    }
 }

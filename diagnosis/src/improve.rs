@@ -174,7 +174,7 @@ fn sharpened(
     faults: &[Fault],
 ) -> Result<Model, FitError> {
     let mut best = model;
-    let mut least = None;
+    let mut error = None;
     for _ in 0..HALVINGS {
         let mut candidate = best.clone();
         let Some(effect) = candidate.effects.last() else {
@@ -186,16 +186,15 @@ fn sharpened(
             .and_then(|i| candidate.parameters[first + i].value);
         let Some(width) = width else { break };
         smooth(&mut candidate, meta, 0.5 * width);
-        let now = match least {
+        let now = match error {
             Some(now) => now,
             None => refitted(&best, runs, test, faults)?.0,
         };
-        least = Some(now);
         let (after, fitted) = refitted(&candidate, runs, test, faults)?;
         if after.is_nan() || after > SHARPER * now {
             break;
         }
-        (best, least) = (fitted, Some(after));
+        (best, error) = (fitted, Some(after));
     }
     Ok(best)
 }

@@ -55,6 +55,10 @@ impl Tally {
         }
     }
 
+    pub(crate) fn rms(&self) -> f64 {
+        (self.squares / self.n + self.mean * self.mean).sqrt()
+    }
+
     pub(crate) fn std(&self) -> f64 {
         (self.squares / self.n).sqrt()
     }

@@ -7,12 +7,13 @@ use loopsight_report::{Context, diagnosis_page, save};
 
 use crate::arguments::DiagnoseOptions;
 use crate::failure::Failure;
-use crate::load::{Loaded, model_and_log, test_runs, writable};
+use crate::load::{Loaded, join, model_and_log, test_runs, writable};
 use crate::{output, progress};
 
 pub(crate) fn run(options: &DiagnoseOptions) -> Result<(), Failure> {
     options.html.as_deref().map_or(Ok(()), writable)?;
     let mut loaded = model_and_log(&options.files)?;
+    join(&mut loaded, &options.also)?;
     let test = test_runs(&mut loaded, options.test.as_deref())?;
     let bar = progress::bar("trying effects", 1);
     let diagnosis = diagnose(

@@ -7,7 +7,7 @@ use loopsight_report::{Context, fit_page, save};
 
 use crate::arguments::{FitOptions, MethodName, SchemeName};
 use crate::failure::Failure;
-use crate::load::{Loaded, model_and_log, refuse_fatal, save_text, test_runs, writable};
+use crate::load::{Loaded, join, model_and_log, refuse_fatal, save_text, test_runs, writable};
 use crate::{output, progress};
 
 pub(crate) fn run(options: &FitOptions) -> Result<(), Failure> {
@@ -15,6 +15,7 @@ pub(crate) fn run(options: &FitOptions) -> Result<(), Failure> {
         writable(path)?;
     }
     let mut loaded = model_and_log(&options.files)?;
+    join(&mut loaded, &options.also)?;
     refuse_fatal(&loaded.log_path, &loaded.faults)?;
     let test = test_runs(&mut loaded, options.test.as_deref())?;
     let settings = FitSettings {

@@ -7,13 +7,14 @@ use loopsight_report::{improvement_page, save};
 use crate::arguments::ImproveOptions;
 use crate::commands::diagnose::{context, pictures, sentence};
 use crate::failure::Failure;
-use crate::load::{model_and_log, save_text, test_runs, writable};
+use crate::load::{join, model_and_log, save_text, test_runs, writable};
 use crate::{output, progress};
 
 pub(crate) fn run(options: &ImproveOptions) -> Result<(), Failure> {
     options.output.as_deref().map_or(Ok(()), writable)?;
     options.html.as_deref().map_or(Ok(()), writable)?;
     let mut loaded = model_and_log(&options.files)?;
+    join(&mut loaded, &options.also)?;
     let test = test_runs(&mut loaded, options.test.as_deref())?;
     let bar = progress::bar("round 1", 1);
     let improvement = improve(
