@@ -10,6 +10,8 @@ use loopsight_core::{Channel, EffectMeta, Parameter, Place, Role};
 pub(crate) struct Candidate {
     pub(crate) meta: &'static EffectMeta,
     pub(crate) at: Vec<&'static str>,
+    /// Each channel has parameters of its own; else they share them.
+    pub(crate) separate: bool,
     /// The model with it, at neutral parameters.
     pub(crate) model: Model,
     /// Root mean square of the flow at its channels in the recording; 0 where there is none.
@@ -20,7 +22,23 @@ impl Candidate {
     /// Parameters of the model that the candidate brought, by index.
     pub(crate) fn own(&self) -> std::ops::Range<usize> {
         let n = self.model.parameters.len();
-        n - self.meta.parameters.len()..n
+        n - self.instances() * self.meta.parameters.len()..n
+    }
+
+    /// How many times the effect is in the model.
+    fn instances(&self) -> usize {
+        if self.separate { self.at.len() } else { 1 }
+    }
+
+    /// The name of one of its own parameters, by index in the model, as it is reported.
+    pub(crate) fn name(&self, index: usize) -> String {
+        let id = self.model.parameters[index].declaration.id;
+        if self.separate {
+            let instance = (index - self.own().start) / self.meta.parameters.len().max(1);
+            format!("{id}@{}", self.at[instance])
+        } else {
+            id.to_owned()
+        }
     }
 
     /// How many of them are found from the log: estimated, or chosen from a list.
@@ -36,7 +54,8 @@ impl Candidate {
     /// The candidate with its sign smoothed over less; none where it has no sign.
     pub(crate) fn sharp(&self) -> Option<Self> {
         let mut sharp = self.clone();
-        smooth(&mut sharp.model, sharp.meta, SHARP * sharp.flow).then_some(sharp)
+        let n = self.instances();
+        smooth(&mut sharp.model, n, SHARP * sharp.flow).then_some(sharp)
     }
 
     /// The candidate with the values of `start` for those of its parameters that are not estimated.
@@ -53,7 +72,7 @@ impl Candidate {
 }
 
 /// All candidates for `model`: each effect at every single channel it fits, and at all channels of a
-/// family (both wheels, all inputs) alike. What the model already has at the same channels, and
+/// family (both wheels, all inputs), alike and each with its own parameters. What the model already has at the same channels, and
 /// what acts on a signal that is not measured, is left out.
 ///
 /// `rms` holds the root mean squares of the plant's signals in the recording: smoothing widths are
@@ -69,14 +88,29 @@ pub(crate) fn candidates(model: &Model, rms: &[f64]) -> Vec<Candidate> {
             if present {
                 continue;
             }
-            if let Some(mut with) = model.with_effect(meta.id, &at) {
-                let flow = suit(&mut with, meta, rms);
-                found.push(Candidate {
-                    meta,
-                    at,
-                    model: with,
-                    flow,
-                });
+            let each: Vec<&[&str]> = at.chunks(1).collect();
+            let ways: &[(bool, &[&[&str]])] = &[(false, &[&at]), (true, &each)];
+            for (separate, sets) in ways {
+                if *separate && (at.len() < 2 || meta.shared_only || meta.sided) {
+                    continue;
+                }
+                let mut with = Some(model.clone());
+                let mut flow = 0.0;
+                for set in *sets {
+                    with = with.and_then(|m| m.with_effect(meta.id, set));
+                    if let Some(model) = &mut with {
+                        flow = suit(model, rms).max(flow);
+                    }
+                }
+                if let Some(model) = with {
+                    found.push(Candidate {
+                        meta,
+                        at: at.clone(),
+                        separate: *separate,
+                        model,
+                        flow,
+                    });
+                }
             }
         }
     }
@@ -90,7 +124,7 @@ const SHARP: f64 = 0.004;
 
 /// Gives the last effect of `model` the widths that suit the recording; returns the root mean
 /// square of the flow at its channels.
-pub(crate) fn suit(model: &mut Model, meta: &EffectMeta, rms: &[f64]) -> f64 {
+pub(crate) fn suit(model: &mut Model, rms: &[f64]) -> f64 {
     let Some(effect) = model.effects.last() else {
         return 0.0;
     };
@@ -100,7 +134,7 @@ pub(crate) fn suit(model: &mut Model, meta: &EffectMeta, rms: &[f64]) -> f64 {
         .filter_map(|c| model.find_signal(c.read(Role::Flow)?).ok())
         .filter_map(|i| rms.get(i).copied())
         .fold(0.0, f64::max);
-    smooth(model, meta, WIDTH * flow);
+    smooth(model, 1, WIDTH * flow);
     flow
 }
 
@@ -109,16 +143,15 @@ pub(crate) fn is_width(declaration: &Parameter) -> bool {
     declaration.unit == "flow" && !declaration.estimated
 }
 
-/// Gives the last effect of `model` this width, where it has one; says whether it has.
-pub(crate) fn smooth(model: &mut Model, meta: &EffectMeta, width: f64) -> bool {
-    let Some(first) = model.effects.last().map(|e| e.first_parameter) else {
-        return false;
-    };
+/// Gives the last `count` effects of `model` this width, where they have one; says whether they have.
+pub(crate) fn smooth(model: &mut Model, count: usize, width: f64) -> bool {
     let mut has = false;
-    for (i, declaration) in meta.parameters.iter().enumerate() {
-        if is_width(declaration) && width > 0.0 {
-            model.parameters[first + i].value = Some(width);
-            has = true;
+    for effect in model.effects.iter().rev().take(count) {
+        for (i, declaration) in effect.meta.parameters.iter().enumerate() {
+            if is_width(declaration) && width > 0.0 {
+                model.parameters[effect.first_parameter + i].value = Some(width);
+                has = true;
+            }
         }
     }
     has

@@ -1,9 +1,10 @@
 //! Which explanation comes first.
 
 use crate::conclusion::{Explanation, Place};
-use crate::diagnose::{CLOSE, Judged, SAME};
+use crate::diagnose::{CLOSE, SAME};
 use crate::fit::Fit;
 use crate::judge::{advantage, nrmse};
+use crate::trial::Judged;
 
 /// Share of what the best explanation leaves above the floor by which a smaller one may be worse.
 const BLUR: f64 = 0.3;
@@ -21,28 +22,31 @@ pub(crate) fn choose(
     finalists: &[(Judged, Fit)],
     floor: f64,
 ) -> Option<Chosen> {
-    let best = &finalists.first()?.0;
+    finalists.first()?;
     let squared = |i: usize| nrmse(&finalists[i].0.rank).powi(2);
     let least = squared(0);
     // While the best explanation itself leaves much unexplained, small differences between
     // explanations are those of what else is missing.
     let allowed = least + BLUR * (least - floor * floor).max(0.0);
+    // No worse than another, by statistics or for all that can be done with it.
+    let same = |i: usize, other: usize| {
+        let (rank, other) = (&finalists[i].0.rank, &finalists[other].0.rank);
+        advantage(rank, other) < SAME || nrmse(rank) < CLOSE * nrmse(other)
+    };
     let not_worse: Vec<usize> = (0..finalists.len())
-        .filter(|i| {
-            let rank = &finalists[*i].0.rank;
-            advantage(rank, &best.rank) < SAME
-                || nrmse(rank) < CLOSE * nrmse(&best.rank)
-                || squared(*i) < allowed
-        })
+        .filter(|i| same(*i, 0) || squared(*i) < allowed)
         .collect();
     let complexity = |i: usize| finalists[i].0.candidate.complexity();
-    let chosen = *not_worse.iter().min_by(|a, b| {
-        // The common before the rare, and both wheels alike before one wheel: what is built alike
-        // fails alike.
+    let error = |i: usize| nrmse(&finalists[i].0.rank);
+    let simplest = not_worse.iter().map(|i| complexity(*i)).min()?;
+    let simple = || not_worse.iter().filter(|i| complexity(**i) == simplest);
+    let leader = *simple().min_by(|a, b| error(**a).total_cmp(&error(**b)))?;
+    // The common before the rare, and both wheels alike before one wheel: what is built alike fails
+    // alike. But only where the errors do not tell them apart.
+    let chosen = *simple().filter(|i| same(**i, leader)).min_by(|a, b| {
         let channels = |i: usize| usize::MAX - explanations[i].place.at.len();
         let rarity = |i: usize| finalists[i].0.candidate.meta.rarity;
-        let key = |i: usize| (complexity(i), rarity(i), channels(i));
-        let error = |i: usize| nrmse(&finalists[i].0.rank);
+        let key = |i: usize| (rarity(i), channels(i));
         key(**a)
             .cmp(&key(**b))
             .then(error(**a).total_cmp(&error(**b)))

@@ -18,11 +18,11 @@ use crate::holdout::Holdout;
 use crate::judge::{Losses, advantage, nrmse, significance};
 use crate::observer::{Held, hold_alike};
 use crate::output_error::prepare;
-use crate::positions::Positions;
 use crate::prediction::signal_rms;
-use crate::problem::{Effort, Problem, Solution};
+use crate::problem::Problem;
 use crate::residual_force;
 use crate::sufficiency;
+use crate::trial::{FINAL, Judged, finish, grown, look, promise, starts};
 use crate::where_it_fails::where_it_fails;
 
 /// Explanations that are reported.
@@ -33,20 +33,8 @@ const FINALISTS: usize = 9;
 const LOOKED_AT: usize = 36;
 /// Starts of one candidate that are looked at.
 const STARTS: usize = 2;
-/// Most starts of a candidate that is looked at from where a simpler one ended.
-const GROWN: usize = 3;
 /// Places of one effect among the finalists.
 const SIBLINGS: usize = 2;
-/// Effort of a first look at a candidate.
-const LOOK: Effort = Effort {
-    iterations: 7,
-    tolerance: 1e-3,
-};
-/// Effort of a finalist.
-const FINAL: Effort = Effort {
-    iterations: 16,
-    tolerance: 1e-6,
-};
 /// An explanation must beat the plain model by so many standard errors on data neither saw. There
 /// are about a hundred candidates: a chance of 1e-4 each is one of 1 % for all.
 const BEATS: f64 = 3.7;
@@ -71,20 +59,6 @@ const UNDETERMINED: f64 = 10.0;
 const BLIND: f64 = 1.3;
 /// Above this multiple of the floor something must be missing.
 const ABOVE_FLOOR: f64 = 1.5;
-
-/// Longest integration step of a first look, s: far below what any sensor sees.
-const LOOK_STEP: f64 = 0.005;
-
-/// A candidate, fitted and judged.
-#[derive(Clone)]
-pub(crate) struct Judged {
-    pub(crate) candidate: Candidate,
-    pub(crate) solution: Solution,
-    /// On what no fit saw.
-    pub(crate) losses: Losses,
-    /// What candidates are ranked by.
-    pub(crate) rank: Losses,
-}
 
 /// Adds every effect of the library to `model` at every place it fits, refits all parameters each
 /// time, and judges by the free run on data that the fits did not see.
@@ -140,6 +114,7 @@ pub(crate) fn diagnose_above(
     let attempts: Vec<(usize, Vec<f64>)> = all
         .iter()
         .enumerate()
+        .filter(|(_, c)| !c.separate)
         .flat_map(|(i, c)| {
             starts(c, &nominal.values, &BTreeMap::new(), duration)
                 .into_iter()
@@ -174,7 +149,14 @@ pub(crate) fn diagnose_above(
             Some((*i, found?))
         })
         .collect();
-    looked.extend(grown(&all, &looked, &holdout, &nominal, duration));
+    looked.extend(grown(
+        &all,
+        &looked,
+        &holdout,
+        &nominal,
+        &nominal_rank,
+        duration,
+    ));
     looked.sort_by(|a, b| nrmse(&a.1.rank).total_cmp(&nrmse(&b.1.rank)));
     let mut judged: Vec<Judged> = Vec::new();
     for k in 0..looked.len() {
@@ -191,6 +173,10 @@ pub(crate) fn diagnose_above(
                 .simpler
                 .contains(&other.candidate.meta.id)
                 && found.candidate.at == other.candidate.at;
+            let alike = found.candidate.separate
+                && other.candidate.meta.id == id
+                && other.candidate.at == found.candidate.at
+                && !other.candidate.separate;
             // On a straight run one wheel stands for both: then both.
             let wider = other.candidate.meta.id == id
                 && found
@@ -199,7 +185,7 @@ pub(crate) fn diagnose_above(
                     .iter()
                     .all(|c| other.candidate.at.contains(c))
                 && other.candidate.at.len() > found.candidate.at.len();
-            (special || wider) && close(other)
+            (special || alike || wider) && close(other)
         });
         let siblings = judged.iter().filter(|j| j.candidate.meta.id == id).count();
         if !again && !needless && siblings < SIBLINGS && judged.len() < FINALISTS {
@@ -307,169 +293,6 @@ fn refused(verdict: Conclusion, faults: &[Fault], advice: Vec<Advice>) -> Diagno
     }
 }
 
-/// Shares of the flow that a speed to be estimated starts from.
-const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
-
-/// Looks at candidates that contain a simpler one from where the simpler one ended: strong
-/// breakaway friction is found from dry friction, not from none.
-fn grown(
-    all: &[Candidate],
-    looked: &[(usize, Judged)],
-    holdout: &Holdout<'_>,
-    nominal: &Solution,
-    duration: f64,
-) -> Vec<(usize, Judged)> {
-    let mut attempts: Vec<(usize, Vec<f64>)> = Vec::new();
-    for (i, candidate) in all.iter().enumerate() {
-        let simpler = looked
-            .iter()
-            .filter(|(j, _)| {
-                candidate.meta.simpler.contains(&all[*j].meta.id) && candidate.at == all[*j].at
-            })
-            .min_by(|a, b| nrmse(&a.1.rank).total_cmp(&nrmse(&b.1.rank)));
-        let Some((j, found)) = simpler else { continue };
-        let own = all[*j].own();
-        let values = &found.solution.values;
-        let known: BTreeMap<&str, f64> = all[*j]
-            .meta
-            .parameters
-            .iter()
-            .zip(&values[own.clone()])
-            .map(|(declaration, value)| (declaration.id, *value))
-            .collect();
-        let starts = starts(candidate, &values[..own.start], &known, duration);
-        if starts.len() <= GROWN {
-            attempts.extend(starts.into_iter().map(|start| (i, start)));
-        }
-    }
-    attempts
-        .par_iter()
-        .filter_map(|(i, start)| Some((*i, look(&all[*i].chosen(start), start, holdout, nominal)?)))
-        .collect()
-}
-
-/// Values to start a candidate from: those of the rest of the model from `base`, its own as `known`,
-/// else a noticeable step from neutral.
-fn starts(
-    candidate: &Candidate,
-    base: &[f64],
-    known: &BTreeMap<&str, f64>,
-    duration: f64,
-) -> Vec<Vec<f64>> {
-    let mut all = vec![base.to_vec()];
-    for i in candidate.own() {
-        let parameter = &candidate.model.parameters[i];
-        let nearest = |value: f64| parameter.declaration.nearest(value);
-        let neutral = parameter.value.unwrap_or(0.0);
-        let listed = parameter.starts(duration);
-        let values: Vec<f64> = if let Some(value) = known.get(parameter.declaration.id) {
-            vec![*value]
-        } else if !parameter.free && listed.is_empty() {
-            vec![neutral]
-        } else if parameter.free && parameter.declaration.unit == "flow" && candidate.flow > 0.0 {
-            FLOW_STARTS
-                .iter()
-                .map(|s| nearest(s * candidate.flow))
-                .collect()
-        } else if listed.is_empty() {
-            vec![nearest(neutral + parameter.scale())]
-        } else {
-            listed.into_iter().map(nearest).collect()
-        };
-        all = all
-            .iter()
-            .flat_map(|start| {
-                values.iter().map(move |value| {
-                    let mut start = start.clone();
-                    start.push(*value);
-                    start
-                })
-            })
-            .collect();
-    }
-    all
-}
-
-/// The model of a candidate for a first look: coarser steps, far below what a sensor sees.
-fn coarse(candidate: &Candidate) -> Model {
-    let mut model = candidate.model.clone();
-    model.max_step = model.max_step.max(LOOK_STEP);
-    model
-}
-
-/// What a candidate promises to leave of the cost, from one start.
-fn promise(
-    candidate: &Candidate,
-    start: &[f64],
-    holdout: &Holdout<'_>,
-    nominal: &Solution,
-) -> Option<f64> {
-    let model = coarse(candidate);
-    let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
-    let mut problem =
-        Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {}).ok()?;
-    problem.positions = positions(candidate, start);
-    problem.promise(start, &states)
-}
-
-/// Where the candidate reads a position it is first tried at the measured ones.
-fn positions(candidate: &Candidate, start: &[f64]) -> Option<Positions> {
-    Positions::matter_to(candidate.meta)
-        .then(|| Positions::of(&candidate.model, start))
-        .flatten()
-}
-
-/// A quick fit of a candidate from one start, with the nominal initial states.
-fn look(
-    candidate: &Candidate,
-    start: &[f64],
-    holdout: &Holdout<'_>,
-    nominal: &Solution,
-) -> Option<Judged> {
-    let model = coarse(candidate);
-    let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
-    let problem = || Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {});
-    let mut start = start.to_vec();
-    if let Some(measured) = positions(candidate, &start) {
-        let mut problem = problem().ok()?;
-        problem.positions = Some(measured);
-        start = problem.solve_from(&start, &states, LOOK).ok()?.values;
-    }
-    let solution = problem().ok()?.solve_from(&start, &states, LOOK).ok()?;
-    let losses = holdout.judge(&model, &solution);
-    let rank = holdout.rank(&model, &solution, &losses);
-    nrmse(&rank).is_finite().then(|| Judged {
-        candidate: candidate.clone(),
-        solution,
-        losses,
-        rank,
-    })
-}
-
-/// The full fit of a finalist, initial states included, with intervals.
-fn finish(first: Judged, holdout: &Holdout<'_>, nominal: &Solution) -> Option<(Judged, Fit)> {
-    let quiet = |_: u64, _: f64| {};
-    let model = &first.candidate.model;
-    let mut problem =
-        Problem::with(model, holdout.runs, holdout.seen.as_deref(), None, &quiet).ok()?;
-    let start = problem.pack(&first.solution.values, &nominal.states);
-    let start = problem.balance(start);
-    let found = problem.solve(&start, FINAL).ok()?;
-    let fit = problem.result(&found);
-    let solution = problem.solution(&found);
-    let losses = holdout.judge(model, &solution);
-    let rank = holdout.rank(model, &solution, &losses);
-    nrmse(&rank).is_finite().then_some((
-        Judged {
-            candidate: first.candidate,
-            solution,
-            losses,
-            rank,
-        },
-        fit,
-    ))
-}
-
 fn place(candidate: &Candidate) -> Place {
     Place {
         effect: candidate.meta.id.to_owned(),
@@ -494,7 +317,7 @@ fn explain(
                 };
                 // What was tried counts as found: a number of teeth is not fitted but chosen.
                 if parameter.free || !parameter.declaration.starts.is_empty() {
-                    parameters.insert(parameter.declaration.id.to_owned(), estimate.clone());
+                    parameters.insert(candidate.name(i), estimate.clone());
                 }
             }
             Explanation {

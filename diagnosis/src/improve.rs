@@ -181,11 +181,13 @@ fn sharpened(
             break;
         };
         let (meta, first) = (effect.meta, effect.first_parameter);
+        let added = candidate.effects.iter().rev();
+        let count = added.take_while(|e| e.meta.id == meta.id).count();
         let width = (0..meta.parameters.len())
             .find(|i| is_width(&meta.parameters[*i]))
             .and_then(|i| candidate.parameters[first + i].value);
         let Some(width) = width else { break };
-        smooth(&mut candidate, meta, 0.5 * width);
+        smooth(&mut candidate, count, 0.5 * width);
         let now = match error {
             Some(now) => now,
             None => refitted(&best, runs, test, faults)?.0,

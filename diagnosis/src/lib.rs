@@ -29,6 +29,7 @@ mod rounding;
 mod score;
 mod sufficiency;
 pub mod tracking;
+mod trial;
 mod where_it_fails;
 
 pub use advice::Advice;

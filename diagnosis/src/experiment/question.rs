@@ -363,7 +363,7 @@ impl Side {
         };
         let mut with = model.with_effect(&place.effect, &at).ok_or_else(misfit)?;
         let meta = with.effects.last().map(|e| e.meta).ok_or_else(misfit)?;
-        let flow = suit(&mut with, meta, rms);
+        let flow = suit(&mut with, rms);
         let first = model.parameters.len();
         let on_input = with
             .effects

@@ -1,0 +1,217 @@
+//! One candidate at a time: where to start it, a first look, the full fit.
+
+use std::collections::BTreeMap;
+
+use loopsight_core::model::Model;
+use rayon::prelude::*;
+
+use crate::candidates::Candidate;
+use crate::fit::Fit;
+use crate::holdout::Holdout;
+use crate::judge::{Losses, nrmse};
+use crate::positions::Positions;
+use crate::problem::{Effort, Problem, Solution};
+
+/// Effort of a first look at a candidate.
+const LOOK: Effort = Effort {
+    iterations: 7,
+    tolerance: 1e-3,
+};
+/// Effort of a finalist.
+pub(crate) const FINAL: Effort = Effort {
+    iterations: 16,
+    tolerance: 1e-6,
+};
+/// Longest integration step of a first look, s: far below what any sensor sees.
+const LOOK_STEP: f64 = 0.005;
+
+/// Most starts of a candidate that is looked at from where a simpler one ended.
+const GROWN: usize = 3;
+/// An effect at several channels alike is tried at each with its own parameters where it leaves less
+/// than this share of the error.
+const WORTH_DIVIDING: f64 = 0.8;
+/// A candidate, fitted and judged.
+#[derive(Clone)]
+pub(crate) struct Judged {
+    pub(crate) candidate: Candidate,
+    pub(crate) solution: Solution,
+    /// On what no fit saw.
+    pub(crate) losses: Losses,
+    /// What candidates are ranked by.
+    pub(crate) rank: Losses,
+}
+
+/// Shares of the flow that a speed to be estimated starts from.
+const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
+
+/// Looks at candidates that contain a simpler one from where the simpler one ended: strong
+/// breakaway friction is found from dry friction, not from none, and two levels from one for both.
+pub(crate) fn grown(
+    all: &[Candidate],
+    looked: &[(usize, Judged)],
+    holdout: &Holdout<'_>,
+    nominal: &Solution,
+    nominal_rank: &Losses,
+    duration: f64,
+) -> Vec<(usize, Judged)> {
+    let mut attempts: Vec<(usize, Vec<f64>)> = Vec::new();
+    for (i, candidate) in all.iter().enumerate() {
+        let simpler = looked
+            .iter()
+            .filter(|(j, found)| {
+                let other = &all[*j];
+                let contains = candidate.meta.simpler.contains(&other.meta.id);
+                let divides = candidate.separate
+                    && candidate.meta.id == other.meta.id
+                    && nrmse(&found.rank) < WORTH_DIVIDING * nrmse(nominal_rank);
+                (contains && !candidate.separate || divides)
+                    && candidate.at == other.at
+                    && !other.separate
+            })
+            .min_by(|a, b| nrmse(&a.1.rank).total_cmp(&nrmse(&b.1.rank)));
+        let Some((j, found)) = simpler else { continue };
+        let own = all[*j].own();
+        let values = &found.solution.values;
+        let known: BTreeMap<&str, f64> = all[*j]
+            .meta
+            .parameters
+            .iter()
+            .zip(&values[own.clone()])
+            .map(|(declaration, value)| (declaration.id, *value))
+            .collect();
+        let starts = starts(candidate, &values[..own.start], &known, duration);
+        if starts.len() <= GROWN {
+            attempts.extend(starts.into_iter().map(|start| (i, start)));
+        }
+    }
+    attempts
+        .par_iter()
+        .filter_map(|(i, start)| Some((*i, look(&all[*i].chosen(start), start, holdout, nominal)?)))
+        .collect()
+}
+
+/// Values to start a candidate from: those of the rest of the model from `base`, its own as `known`,
+/// else a noticeable step from neutral.
+pub(crate) fn starts(
+    candidate: &Candidate,
+    base: &[f64],
+    known: &BTreeMap<&str, f64>,
+    duration: f64,
+) -> Vec<Vec<f64>> {
+    let mut all = vec![base.to_vec()];
+    for i in candidate.own() {
+        let parameter = &candidate.model.parameters[i];
+        let nearest = |value: f64| parameter.declaration.nearest(value);
+        let neutral = parameter.value.unwrap_or(0.0);
+        let listed = parameter.starts(duration);
+        let values: Vec<f64> = if let Some(value) = known.get(parameter.declaration.id) {
+            vec![*value]
+        } else if !parameter.free && listed.is_empty() {
+            vec![neutral]
+        } else if parameter.free && parameter.declaration.unit == "flow" && candidate.flow > 0.0 {
+            FLOW_STARTS
+                .iter()
+                .map(|s| nearest(s * candidate.flow))
+                .collect()
+        } else if listed.is_empty() {
+            vec![nearest(neutral + parameter.scale())]
+        } else {
+            listed.into_iter().map(nearest).collect()
+        };
+        all = all
+            .iter()
+            .flat_map(|start| {
+                values.iter().map(move |value| {
+                    let mut start = start.clone();
+                    start.push(*value);
+                    start
+                })
+            })
+            .collect();
+    }
+    all
+}
+
+/// The model of a candidate for a first look: coarser steps, far below what a sensor sees.
+fn coarse(candidate: &Candidate) -> Model {
+    let mut model = candidate.model.clone();
+    model.max_step = model.max_step.max(LOOK_STEP);
+    model
+}
+
+/// What a candidate promises to leave of the cost, from one start.
+pub(crate) fn promise(
+    candidate: &Candidate,
+    start: &[f64],
+    holdout: &Holdout<'_>,
+    nominal: &Solution,
+) -> Option<f64> {
+    let model = coarse(candidate);
+    let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
+    let mut problem =
+        Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {}).ok()?;
+    problem.positions = positions(candidate, start);
+    problem.promise(start, &states)
+}
+
+/// Where the candidate reads a position it is first tried at the measured ones.
+fn positions(candidate: &Candidate, start: &[f64]) -> Option<Positions> {
+    Positions::matter_to(candidate.meta)
+        .then(|| Positions::of(&candidate.model, start))
+        .flatten()
+}
+
+/// A quick fit of a candidate from one start, with the nominal initial states.
+pub(crate) fn look(
+    candidate: &Candidate,
+    start: &[f64],
+    holdout: &Holdout<'_>,
+    nominal: &Solution,
+) -> Option<Judged> {
+    let model = coarse(candidate);
+    let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
+    let problem = || Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {});
+    let mut start = start.to_vec();
+    if let Some(measured) = positions(candidate, &start) {
+        let mut problem = problem().ok()?;
+        problem.positions = Some(measured);
+        start = problem.solve_from(&start, &states, LOOK).ok()?.values;
+    }
+    let solution = problem().ok()?.solve_from(&start, &states, LOOK).ok()?;
+    let losses = holdout.judge(&model, &solution);
+    let rank = holdout.rank(&model, &solution, &losses);
+    nrmse(&rank).is_finite().then(|| Judged {
+        candidate: candidate.clone(),
+        solution,
+        losses,
+        rank,
+    })
+}
+
+/// The full fit of a finalist, initial states included, with intervals.
+pub(crate) fn finish(
+    first: Judged,
+    holdout: &Holdout<'_>,
+    nominal: &Solution,
+) -> Option<(Judged, Fit)> {
+    let quiet = |_: u64, _: f64| {};
+    let model = &first.candidate.model;
+    let mut problem =
+        Problem::with(model, holdout.runs, holdout.seen.as_deref(), None, &quiet).ok()?;
+    let start = problem.pack(&first.solution.values, &nominal.states);
+    let start = problem.balance(start);
+    let found = problem.solve(&start, FINAL).ok()?;
+    let fit = problem.result(&found);
+    let solution = problem.solution(&found);
+    let losses = holdout.judge(model, &solution);
+    let rank = holdout.rank(model, &solution, &losses);
+    nrmse(&rank).is_finite().then_some((
+        Judged {
+            candidate: first.candidate,
+            solution,
+            losses,
+            rank,
+        },
+        fit,
+    ))
+}
