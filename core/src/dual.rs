@@ -173,6 +173,10 @@ impl Real for Dual {
         let (sin, cos) = libm::sincos(self.value);
         self.chain(cos, -sin)
     }
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = libm::sincos(self.value);
+        (self.chain(sin, cos), self.chain(cos, -sin))
+    }
     fn tanh(self) -> Self {
         let tanh = libm::tanh(self.value);
         self.chain(tanh, 1.0 - tanh * tanh)

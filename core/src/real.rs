@@ -41,6 +41,8 @@ pub trait Real:
     fn sin(self) -> Self;
     /// Cosine of an angle in radians.
     fn cos(self) -> Self;
+    /// Sine and cosine of an angle in radians, for little more than the price of one.
+    fn sin_cos(self) -> (Self, Self);
     /// Hyperbolic tangent.
     fn tanh(self) -> Self;
     /// `e^x`.
@@ -87,6 +89,9 @@ impl Real for f32 {
     fn cos(self) -> Self {
         libm::cosf(self)
     }
+    fn sin_cos(self) -> (Self, Self) {
+        libm::sincosf(self)
+    }
     fn tanh(self) -> Self {
         libm::tanhf(self)
     }
@@ -113,6 +118,9 @@ impl Real for f64 {
     }
     fn cos(self) -> Self {
         libm::cos(self)
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        libm::sincos(self)
     }
     fn tanh(self) -> Self {
         libm::tanh(self)

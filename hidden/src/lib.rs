@@ -43,7 +43,7 @@ pub use effect::Hidden;
 pub use error::HiddenError;
 pub use experiment::{DURATION, Experiment, PERIOD};
 pub use library::{visibility, write_library};
-pub use recording::{Recording, nrmse, overall, record, record_with};
+pub use recording::{Recording, nrmse, overall, record, record_along, record_with};
 pub use refit::{Refit, refit};
 pub use robot::{Body, Lumped, Motor, Robot};
 pub use truth::{Concealed, Quantity, Truth};

@@ -6,7 +6,7 @@ use loopsight_core::run::Run;
 use loopsight_recordings::write_csv;
 
 use crate::error::HiddenError;
-use crate::experiment::{Experiment, PERIOD, SAMPLES};
+use crate::experiment::{Experiment, PERIOD};
 use crate::hide::hide;
 use crate::machine::{Machine, STEP};
 use crate::motor::COPPER;
@@ -76,6 +76,23 @@ pub fn record_with(
     winding_time_constant: f64,
 ) -> Result<Recording, HiddenError> {
     let commands = experiment.commands(robot, seed)?;
+    record_along(robot, effects, &commands, seed, winding_time_constant)
+}
+
+/// [`record_with`] along commands of one's own, V, one row per sampling period: a planned
+/// experiment. On a machine with one motor the second of a row is not used.
+///
+/// # Errors
+///
+/// As [`record`].
+pub fn record_along(
+    robot: Robot,
+    effects: &[(Hidden, f64)],
+    commands: &[[f64; 2]],
+    seed: u64,
+    winding_time_constant: f64,
+) -> Result<Recording, HiddenError> {
+    let samples = commands.len();
     let mut physics = Physics::clean(robot);
     // The windings' formulas have no zero to divide by below a nanosecond.
     physics.motor.inductance = winding_time_constant.max(1e-9) * physics.motor.resistance;
@@ -91,19 +108,19 @@ pub fn record_with(
     let mut machine = Machine::new(physics);
 
     let mut run = Run {
-        time: (0..SAMPLES).map(|k| k as f64 / 100.0).collect(),
+        time: (0..samples).map(|k| k as f64 / 100.0).collect(),
         inputs: commands
             .iter()
             .flat_map(|c| &c[..drives])
             .copied()
             .collect(),
-        measured: Vec::with_capacity(SAMPLES * signals),
+        measured: Vec::with_capacity(samples * signals),
         n_inputs: drives,
         n_measured: signals,
         ..Run::default()
     };
-    let mut exact = Vec::with_capacity(SAMPLES * signals);
-    for command in &commands {
+    let mut exact = Vec::with_capacity(samples * signals);
+    for command in commands {
         let (counted, smooth) = odometry.sample(PERIOD);
         run.measured.extend(&counted[..signals]);
         exact.extend(&smooth[..signals]);

@@ -132,13 +132,14 @@ impl Plant<6, 2, 4, 8, 12> for Ddmr {
         let [k_a, k_b, k_c, k_d, k_e, k_f, _, _] = *p;
         let right = u[0] + w[0];
         let left = u[1] + w[1];
+        let (sin, cos) = heading.sin_cos();
         [
             k_a * v + k_b * omega * omega + k_c * (right + left) + w[2],
             k_d * omega + k_e * v * omega + k_f * (right - left) + w[3],
             omega,
             v,
-            v * heading.cos(),
-            v * heading.sin(),
+            v * cos,
+            v * sin,
         ]
     }
 

@@ -14,6 +14,7 @@ use loopsight_diagnosis::{
     Conclusion, Diagnosis, Limits, Plan, Promise, Question, diagnose, experiment, place,
 };
 use loopsight_drivers::{Simulated, simulate_inputs};
+use loopsight_hidden::{Hidden, Robot, record_along};
 use loopsight_tests::{PERIOD, recording, twil, twil_path};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -58,6 +59,36 @@ fn record(robot: &Model, plan: &Plan, seed: u64) -> Run {
 
 fn asked(run: Run) -> Diagnosis {
     diagnose(&twil(), &[run], None, &[], &|_, _| {}).unwrap()
+}
+
+/// What the machine that is no model of ours, and hides something, does with the plan.
+fn hidden_machine(effect: Hidden, size: f64, plan: &Plan, seed: u64) -> (Model, Run) {
+    let inputs = plan.drive.inputs.chunks_exact(2);
+    let commands: Vec<[f64; 2]> = inputs.map(|u| [u[0], u[1]]).collect();
+    let log = record_along(Robot::Twil, &[(effect, size)], &commands, seed, 1e-4).unwrap();
+    (
+        Model::from_toml("hidden", &log.model_toml).unwrap().0,
+        log.run,
+    )
+}
+
+/// A class that a usual recording of the hidden machine leaves is split by one along the plan made
+/// to split it, whichever of the two it is.
+#[test]
+fn a_plan_splits_the_class_on_the_hidden_machine() {
+    for (hidden, rival, size) in [
+        (Hidden::DeadZone, "coulomb_friction", 1.0),
+        (Hidden::CoulombFriction, "dead_zone", 1.0),
+        (Hidden::BatterySag, "input_saturation", 1.0),
+    ] {
+        let plan = separate(&twil(), hidden.id(), rival);
+        assert_eq!(plan.verdict, Promise::Answers, "{}", plan.reason);
+        let (model, run) = hidden_machine(hidden, size, &plan, 3);
+        let found = diagnose(&model, &[run], None, &[], &|_, _| {}).unwrap();
+        assert_eq!(found.missing.unwrap().effect, hidden.id());
+        let class = &found.candidates[0].indistinguishable_from;
+        assert!(class.iter().all(|p| p.effect != rival), "{class:?}");
+    }
 }
 
 /// Two levels cannot tell a dead zone from a gain: after 25 s of PRBS it is one name among others

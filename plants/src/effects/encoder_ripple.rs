@@ -66,11 +66,11 @@ impl Effect<3, 0> for EncoderRipple {
 
     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 3]) -> S {
         let [sine, cosine, count] = *p;
-        let phase = count * at.get(Role::Shaft);
+        let (sin, cos) = (count * at.get(Role::Shaft)).sin_cos();
         if at.is_position {
-            sine * phase.sin() + cosine * phase.cos()
+            sine * sin + cosine * cos
         } else {
-            at.nominal * count * (sine * phase.cos() - cosine * phase.sin())
+            at.nominal * count * (sine * cos - cosine * sin)
         }
     }
 }

@@ -53,7 +53,8 @@ impl Effect<2, 0> for GravityPendulum {
 
     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 2]) -> S {
         let angle = at.get(Role::Shaft);
-        p[0] * angle.cos() + p[1] * angle.sin()
+        let (sin, cos) = angle.sin_cos();
+        p[0] * cos + p[1] * sin
     }
 }
 

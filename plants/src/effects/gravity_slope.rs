@@ -53,7 +53,8 @@ impl Effect<2, 0> for GravitySlope {
 
     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 2]) -> S {
         let heading = at.get(Role::Heading);
-        p[0] * heading.cos() + p[1] * heading.sin()
+        let (sin, cos) = heading.sin_cos();
+        p[0] * cos + p[1] * sin
     }
 }
 

@@ -61,7 +61,8 @@ impl Effect<3, 0> for TorqueRipple {
     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 3]) -> S {
         let [sine, cosine, count] = *p;
         let phase = count * at.get(Role::Shaft);
-        sine * phase.sin() + cosine * phase.cos()
+        let (sin, cos) = phase.sin_cos();
+        sine * sin + cosine * cos
     }
 }
 
