@@ -95,10 +95,10 @@ impl Effect<4, 0> for PayloadChange {
         let ramp = ((S::of(at.time) - time) / width).tanh();
         let half = S::of(0.5);
         let growth = grown * half * (S::one() + ramp);
-        let taken_up = if grown > S::zero() {
-            grown * half * (S::one() - ramp * ramp) / width
-        } else {
+        let taken_up = if grown < S::zero() {
             S::zero()
+        } else {
+            grown * half * (S::one() - ramp * ramp) / width
         };
         -(at.nominal * growth + taken_up * at.get(Role::Flow)) / (S::one() + growth)
     }

@@ -103,7 +103,7 @@ mod tests {
     fn it_warms_until_it_cools_as_much() {
         let p = [0.0003, 0.02];
         let mut z = [0.0];
-        for _ in 0..40_000 {
+        for _ in 0..200_000 {
             z[0] += 0.01 * WindingHeating::state_derivative(&driven(), &z, &p)[0];
         }
         assert!(
