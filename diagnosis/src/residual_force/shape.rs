@@ -47,6 +47,7 @@ const fn word(role: Role) -> &'static str {
         Role::Armature => "armature",
         Role::Centrifugal => "centrifugal",
         Role::Shaft => "shaft",
+        Role::Stall => "stall",
     }
 }
 
