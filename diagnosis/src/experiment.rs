@@ -41,6 +41,7 @@ use loopsight_core::registry::BuildError;
 use loopsight_core::sensor::Sensor;
 use rayon::prelude::*;
 
+use crate::observer::unstable_at_rest;
 use crate::prediction::signal_rms;
 pub use plan::{Considered, Drive, Limits, Plan, Promise, Question};
 pub use question::{QuestionError, place};
@@ -134,7 +135,8 @@ impl<'m> Design<'m> {
             .collect();
         let x0 = nalgebra::DVector::zeros(model.n_states());
         let rms = signal_rms(model, &values, &[x0], &[run]);
-        if rms.iter().any(|v| !v.is_finite()) {
+        let falls = unstable_at_rest(model, &values, &drive.time);
+        if falls || rms.iter().any(|v| !v.is_finite()) {
             return Err(QuestionError::Unstable);
         }
         Ok(Self {

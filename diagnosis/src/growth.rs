@@ -9,6 +9,8 @@ use crate::observer::Step;
 const TOLERATED: f64 = 10.0;
 /// What has grown so much in the time of the whole horizon grows exponentially.
 const EXPONENTIAL: f64 = 3.0;
+/// An entry of a transition beyond which there is no need to look further.
+const CERTAINLY: f64 = 1e9;
 /// Instants of a run from which errors are followed, as fractions of its length.
 const STARTS: [f64; 3] = [0.0, 0.25, 0.5];
 /// Share of the instants from which errors must grow.
@@ -38,6 +40,22 @@ impl Path {
         self.c.push(step.c.clone());
         self.x.push(step.x.to_vec());
     }
+}
+
+/// Whether errors grow exponentially along a path, by the eigenvalues of its transition.
+pub(crate) fn unstable(path: &Path) -> bool {
+    let Some(first) = path.a.first() else {
+        return false;
+    };
+    let mut transition = DMatrix::identity(first.nrows(), first.ncols());
+    for a in &path.a {
+        transition = a * transition;
+        // Beyond that it is certain, and the numbers would soon end.
+        if transition.amax() > CERTAINLY {
+            break;
+        }
+    }
+    radius(&transition, &vec![1.0; first.ncols()]) > EXPONENTIAL
 }
 
 /// How errors of the state grow where they grow too much.

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use crate::floor;
-use crate::growth::{Growth, Path};
+use crate::growth::{Growth, Path, unstable};
 
 /// How a free run was held to the measurements, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -97,6 +97,23 @@ pub(crate) fn growth(model: &Model, values: &[f64], runs: &[Run]) -> Option<Grow
     let design = Design::new(model, values, runs);
     let paths: Vec<Path> = runs.iter().filter_map(|run| design.path(run)).collect();
     Growth::of(&paths, &design.deviation)
+}
+
+/// Whether `model` leaves its rest by itself within the instants `time`, at inputs of zero.
+pub(crate) fn unstable_at_rest(model: &Model, values: &[f64], time: &[f64]) -> bool {
+    let (n_inputs, n_measured) = (model.plant.inputs.len(), model.measured.len());
+    let rest = [Run {
+        time: time.to_vec(),
+        inputs: vec![0.0; n_inputs * time.len()],
+        measured: vec![f64::NAN; n_measured * time.len()],
+        n_inputs,
+        n_measured,
+        ..Run::default()
+    }];
+    let design = Design::new(model, values, &rest);
+    rest.iter()
+        .filter_map(|run| design.path(run))
+        .any(|path| unstable(&path))
 }
 
 /// `runs` with the observer that suits `growth`.

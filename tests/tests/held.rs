@@ -11,9 +11,12 @@ use assert_cmd::Command;
 use loopsight_core::model::Model;
 use loopsight_core::run::Run;
 use loopsight_diagnosis::fit::{Fit, fit};
-use loopsight_diagnosis::{Because, Conclusion, FitSettings, compare, diagnose};
+use loopsight_diagnosis::{
+    Because, Conclusion, FitSettings, Limits, Question, QuestionError, compare, diagnose,
+    experiment,
+};
 use loopsight_tests::balance::{axis, cart_pole, servo, upright};
-use loopsight_tests::{repository, unknown};
+use loopsight_tests::{PERIOD, repository, unknown};
 use rayon::prelude::*;
 use serde_json::Value;
 
@@ -173,6 +176,20 @@ fn an_axis_that_drifts_is_diagnosed() {
     );
     let rough = told(friction);
     assert_eq!(rough.missing.unwrap().effect, "coulomb_friction");
+}
+
+/// A pole falls whatever was planned; an axis that drifts can still be driven.
+#[test]
+fn no_experiment_is_planned_for_what_falls_over() {
+    let limits = Limits {
+        duration: Some(5.0),
+        limit: 2.0,
+        period: PERIOD,
+    };
+    let plan = |model: &Model| experiment(model, &Question::All, &limits);
+    let falls = plan(&cart_pole([1.0; 3], "", true)).err();
+    assert!(matches!(falls, Some(QuestionError::Unstable)), "{falls:?}");
+    assert!(plan(&axis([1.0; 2], "")).is_ok());
 }
 
 /// With some damping the drift is bounded, and the inputs alone say all.

@@ -83,8 +83,10 @@ pub enum QuestionError {
     /// Every parameter is held.
     #[error("every parameter of the model is held: there is nothing to find")]
     NothingFree,
-    /// The model leaves the finite numbers.
-    #[error("the model left the finite numbers: its parameters make it unstable")]
+    /// The model leaves its rest, or the finite numbers.
+    #[error(
+        "the model is unstable: no input planned beforehand keeps it from running away; record it in its loop, with a reference that jumps and something added to the command"
+    )]
     Unstable,
     /// A limit that is none.
     #[error("the {what} is {found} {unit}, expected {expected}")]
