@@ -1,8 +1,10 @@
 //! `loopsight new`: a starting point that runs at once.
 
 mod folder;
+mod model_text;
 mod pace;
 mod robot;
+mod texts;
 mod workshop;
 
 use crate::arguments::NewOptions;
