@@ -112,7 +112,7 @@ fn text(diagnosis: &Diagnosis) -> String {
         ));
         text.push('\n');
     }
-    if let Some(best) = diagnosis.candidates.first() {
+    if let (Some(_), Some(best)) = (&diagnosis.missing, diagnosis.candidates.first()) {
         for other in &best.indistinguishable_from {
             text.push_str(&format!(
                 "\nnot told apart from it by these data: {} at {}",

@@ -53,7 +53,8 @@ impl Effect<2, 1> for WindingHeating {
                 .within(0.0, 10.0)
                 .or(0.0)
                 .nonlinear()
-                .scaled(0.03),
+                .scaled(0.03)
+                .starting_at(&[0.03]),
         ],
         states: 1,
         rarity: 2,
