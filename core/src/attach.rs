@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::config::{ConfigError, Source, Step, nearest};
 use crate::model::{Attached, Model, ModelParameter, signal_index, signals};
-use crate::registry::{AnyPhysics, EffectPart};
+use crate::registry::{EffectPart, ReadyEffect};
 use crate::{Channel, EffectMeta, PlantMeta, Role};
 
 /// Binds the effect `part`, the `index`-th of the file, to its channels and adds its parameters.
@@ -39,7 +39,7 @@ pub(crate) fn attach(
             .ok_or_else(|| {
                 let ids: Vec<&str> = plant.channels.iter().map(|c| c.id).collect();
                 source.error(
-                    &path(&["at".into(), i.into()]),
+                    &path(&[part.at_key().into(), i.into()]),
                     &format!(
                         "the plant `{}` has no channel `{id}`, expected one of {}",
                         plant.id,
@@ -48,50 +48,39 @@ pub(crate) fn attach(
                     nearest(id, ids).map(|n| format!("did you mean `{n}`?")),
                 )
             })?;
-        if let Some(why) = misfit(channel, meta) {
-            let fitting = fitting_channels(plant, meta);
+        at.push(channel);
+    }
+    let ready = part
+        .ready(plant, &at)
+        .map_err(|mistake| source.mistake(&base, mistake))?;
+    for (i, channel) in at.iter().enumerate() {
+        if let Some(why) = misfit(channel, ready.meta) {
+            let fitting = fitting_channels(plant, ready.meta);
             return Err(source.error(
-                &path(&["at".into(), i.into()]),
-                &format!("`{}` cannot act on `{id}`: {why}", meta.id),
+                &path(&[part.at_key().into(), i.into()]),
+                &format!("`{}` cannot act on `{}`: {why}", meta.id, channel.id),
                 Some(format!("channels where it fits: {}", fitting.join(", "))),
             ));
         }
-        at.push(channel);
     }
-    let given = &part.values().given;
-    Ok(bind(
-        plant,
-        meta,
-        part.physics(),
-        at,
-        given,
-        &base,
-        parameters,
-    ))
+    Ok(bind(plant, ready, at, &base, parameters))
 }
 
-/// Binds an effect to channels that it fits.
+/// Binds an effect to channels that it fits; its table stands at `base`.
 fn bind(
     plant: &'static PlantMeta,
-    meta: &'static EffectMeta,
-    physics: &'static dyn AnyPhysics,
+    ready: ReadyEffect,
     at: Vec<&'static Channel>,
-    given: &[Option<f64>],
     base: &[Step],
     parameters: &mut Vec<ModelParameter>,
 ) -> Attached {
-    let reads = at
-        .iter()
-        .map(|channel| {
-            let mut bound = [None; Role::COUNT];
-            for role in meta.reads {
-                bound[*role as usize] = channel.read(*role).and_then(|s| signal_index(plant, s));
-            }
-            bound
-        })
-        .collect();
+    let meta = ready.meta;
     let first_parameter = parameters.len();
-    for (declaration, given) in meta.parameters.iter().zip(given) {
+    let declared = meta
+        .parameters
+        .iter()
+        .zip(ready.given.iter().zip(ready.paths));
+    for (declaration, (given, path)) in declared {
         let (unit, size) = at.first().map_or_else(
             || (declaration.unit.to_owned(), 1.0),
             |channel| unit_at(declaration.unit, channel, plant),
@@ -105,19 +94,23 @@ fn bind(
             value: given.or(declaration.default.map(|d| d * size)),
             free: declaration.estimated && acts,
             size,
-            path: base
-                .iter()
-                .cloned()
-                .chain([declaration.id.into()])
-                .collect(),
+            path: base.iter().cloned().chain(path).collect(),
         });
     }
+    let reads = at.iter().map(|channel| {
+        let mut bound = [None; Role::COUNT];
+        for role in meta.reads {
+            bound[*role as usize] = channel.read(*role).and_then(|s| signal_index(plant, s));
+        }
+        bound
+    });
     Attached {
         meta,
+        reads: reads.collect(),
         at,
         first_parameter,
-        physics,
-        reads,
+        physics: ready.physics,
+        signals: ready.signals,
     }
 }
 
@@ -125,27 +118,23 @@ impl Model {
     /// The model with the effect `id` added at the channels `at`, with the effect's default
     /// parameters. `None` when there is no such effect or it does not fit one of the channels.
     pub fn with_effect(&self, id: &str, at: &[&str]) -> Option<Model> {
-        let (meta, physics) = crate::registry::effect(id)?;
+        let ready = crate::registry::effect(id)?;
         let channels: Option<Vec<&'static Channel>> = at
             .iter()
             .map(|name| self.plant.channels.iter().find(|c| c.id == *name))
             .collect();
         let channels = channels?;
-        if channels.is_empty() || channels.iter().any(|c| misfit(c, meta).is_some()) {
+        let fits = |c: &&'static Channel| misfit(c, ready.meta).is_none();
+        if channels.is_empty() || !channels.iter().all(fits) {
             return None;
         }
         let mut model = self.clone();
-        let base: [Step; 3] = ["effect".into(), model.effects.len().into(), meta.id.into()];
-        let given = vec![None; meta.parameters.len()];
-        let attached = bind(
-            self.plant,
-            meta,
-            physics,
-            channels,
-            &given,
-            &base,
-            &mut model.parameters,
-        );
+        let base: [Step; 3] = [
+            "effect".into(),
+            model.effects.len().into(),
+            ready.meta.id.into(),
+        ];
+        let attached = bind(self.plant, ready, channels, &base, &mut model.parameters);
         model.effects.push(attached);
         make_names_unique(&mut model.parameters, &model.effects);
         Some(model)
@@ -193,29 +182,32 @@ impl Model {
     /// The model with its `index`-th effect replaced by the effect `id` at the same channels;
     /// parameters of the same name keep their values.
     pub fn with_effect_replaced(&self, index: usize, id: &str) -> Option<Model> {
-        let old = self.effects.get(index)?;
+        self.effects.get(index)?;
         let mut model = self.clone();
         model.effects.clear();
         model.parameters.truncate(self.n_plant_parameters);
         for (k, effect) in self.effects.iter().enumerate() {
-            let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
-            let new = if k == index { id } else { effect.meta.id };
-            model = model.with_effect(new, &at)?;
-            let first = model.effects[k].first_parameter;
-            for (i, declaration) in model.effects[k].meta.parameters.iter().enumerate() {
-                let same = effect
-                    .meta
-                    .parameters
-                    .iter()
-                    .position(|p| p.id == declaration.id);
-                if let Some(same) = same {
-                    let from = &self.parameters[effect.first_parameter + same];
-                    model.parameters[first + i].value = from.value;
-                    model.parameters[first + i].free = from.free;
+            let first = model.parameters.len();
+            let old = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+            let old = &self.parameters[old];
+            if k == index {
+                let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
+                model = model.with_effect(id, &at)?;
+                for new in &mut model.parameters[first..] {
+                    if let Some(from) = old.iter().find(|p| p.declaration.id == new.declaration.id)
+                    {
+                        new.value = from.value;
+                        new.free = from.free;
+                    }
                 }
+            } else {
+                model.parameters.extend_from_slice(old);
+                let mut kept = effect.clone();
+                kept.first_parameter = first;
+                model.effects.push(kept);
             }
         }
-        debug_assert_eq!(old.at.len(), model.effects[index].at.len());
+        make_names_unique(&mut model.parameters, &model.effects);
         Some(model)
     }
 }

@@ -39,6 +39,14 @@ pub enum PlaceKind {
 }
 
 impl PlaceKind {
+    /// All of them.
+    pub const ALL: [PlaceKind; 4] = [
+        PlaceKind::Effort,
+        PlaceKind::Input,
+        PlaceKind::Body,
+        PlaceKind::Output,
+    ];
+
     /// Name used in listings and messages.
     pub const fn name(self) -> &'static str {
         match self {
@@ -96,6 +104,22 @@ impl Role {
         Role::Shaft,
         Role::Stall,
     ];
+
+    /// Name in files and expressions.
+    pub const fn id(self) -> &'static str {
+        match self {
+            Role::Flow => "flow",
+            Role::Position => "position",
+            Role::Drive => "drive",
+            Role::Heading => "heading",
+            Role::Forward => "forward",
+            Role::Yaw => "yaw",
+            Role::Load => "load",
+            Role::Armature => "armature",
+            Role::Centrifugal => "centrifugal",
+            Role::Shaft => "shaft",
+        }
+    }
 
     /// Name used in messages.
     pub const fn name(self) -> &'static str {

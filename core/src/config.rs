@@ -3,11 +3,16 @@
 //! typetag loses the positions of what it reads. So a file is read with the path of keys kept
 //! (serde_path_to_error), and the path of an error is looked up in the document as it was written.
 
+mod edit;
+mod place;
+
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use toml_edit::{Document, Item};
+
+pub use place::{At, Mistake};
 
 /// A mistake in a TOML file, with its place.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -222,153 +227,6 @@ impl Source {
         }
         self.error(&path, message, None)
     }
-
-    /// The text with numbers replaced or added at the paths given; everything else, comments
-    /// included, stays as it was written.
-    pub fn with_values(&self, values: &[(Vec<Step>, f64)]) -> String {
-        let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
-            return self.text.clone();
-        };
-        for (path, value) in values {
-            set_value(document.as_item_mut(), path, *value);
-        }
-        document.to_string()
-    }
-
-    /// The text with an `[[effect]]` at the end of those it has: its id, channels and parameters.
-    pub fn with_effect(&self, id: &str, at: &[&str], parameters: &[(&str, f64)]) -> String {
-        let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
-            return self.text.clone();
-        };
-        let mut part = toml_edit::Table::new();
-        part.insert(
-            "at",
-            toml_edit::value(at.iter().copied().collect::<toml_edit::Array>()),
-        );
-        for (name, value) in parameters {
-            part.insert(name, toml_edit::value(*value));
-        }
-        let mut entry = toml_edit::Table::new();
-        entry.insert(id, Item::Table(part));
-        let effects = document
-            .entry("effect")
-            .or_insert(Item::ArrayOfTables(toml_edit::ArrayOfTables::new()));
-        match effects {
-            Item::ArrayOfTables(effects) => effects.push(entry),
-            // `effect = []`, as an inline array
-            other => {
-                let mut effects = toml_edit::ArrayOfTables::new();
-                effects.push(entry);
-                *other = Item::ArrayOfTables(effects);
-            }
-        }
-        document.to_string()
-    }
-
-    /// Where the value at `path`, or the deepest known part of it, stands; with `key`, where the
-    /// last key of the path stands.
-    fn locate(&self, path: &[Step], key: bool) -> Range<usize> {
-        let mut span = 0..line_end(&self.text, 0);
-        let mut node = Node::Table(self.document.as_table());
-        for (depth, step) in path.iter().enumerate() {
-            let Some((next, key_span, value_span)) = node.step(step) else {
-                break;
-            };
-            let at_key = key && depth + 1 == path.len();
-            if let Some(found) = if at_key {
-                key_span
-            } else {
-                value_span.or(key_span)
-            } {
-                // A table reaches over many lines: its header is enough.
-                span = found.start..found.end.min(line_end(&self.text, found.start));
-            }
-            node = next;
-        }
-        span
-    }
-}
-
-/// Sets the number at `path` below `item`, keeping what stands around it.
-fn set_value(item: &mut Item, path: &[Step], value: f64) {
-    match path {
-        [] => {}
-        [Step::Key(key)] => {
-            let Some(table) = item.as_table_like_mut() else {
-                return;
-            };
-            let mut new = toml_edit::Value::from(value);
-            if let Some(old) = table.get(key).and_then(Item::as_value) {
-                *new.decor_mut() = old.decor().clone();
-            }
-            table.insert(key, Item::Value(new));
-        }
-        [Step::Key(key), rest @ ..] => {
-            let next = item.as_table_like_mut().and_then(|t| t.get_mut(key));
-            if let Some(next) = next {
-                set_value(next, rest, value);
-            }
-        }
-        [Step::Index(index), rest @ ..] => {
-            let table = item
-                .as_array_of_tables_mut()
-                .and_then(|a| a.get_mut(*index));
-            let [Step::Key(part), rest @ ..] = rest else {
-                return;
-            };
-            if let Some(next) = table.and_then(|t| t.get_mut(part)) {
-                set_value(next, rest, value);
-            }
-        }
-    }
-}
-
-/// A place in a document.
-enum Node<'a> {
-    Table(&'a dyn toml_edit::TableLike),
-    Array(&'a toml_edit::Array),
-    Tables(&'a toml_edit::ArrayOfTables),
-    Leaf,
-}
-
-type Found<'a> = (Node<'a>, Option<Range<usize>>, Option<Range<usize>>);
-
-impl<'a> Node<'a> {
-    fn step(&self, step: &Step) -> Option<Found<'a>> {
-        match (self, step) {
-            (Node::Table(table), Step::Key(key)) => {
-                let (found, item) = table.get_key_value(key)?;
-                let node = match item {
-                    Item::Table(table) => Node::Table(table),
-                    Item::ArrayOfTables(tables) => Node::Tables(tables),
-                    Item::Value(value) => Node::of(value),
-                    Item::None => Node::Leaf,
-                };
-                Some((node, found.span(), item.span()))
-            }
-            (Node::Array(array), Step::Index(index)) => {
-                let value = array.get(*index)?;
-                Some((Node::of(value), value.span(), value.span()))
-            }
-            (Node::Tables(tables), Step::Index(index)) => {
-                let table = tables.get(*index)?;
-                Some((Node::Table(table), table.span(), table.span()))
-            }
-            _ => None,
-        }
-    }
-
-    fn of(value: &'a toml_edit::Value) -> Self {
-        match value {
-            toml_edit::Value::InlineTable(table) => Node::Table(table),
-            toml_edit::Value::Array(array) => Node::Array(array),
-            _ => Node::Leaf,
-        }
-    }
-}
-
-fn line_end(text: &str, from: usize) -> usize {
-    text[from..].find('\n').map_or(text.len(), |n| from + n)
 }
 
 fn make_error(
@@ -465,23 +323,6 @@ mod tests {
         let error = source.read::<Thing>().unwrap_err();
         assert_eq!((error.line, error.column), (2, 14));
         assert!(error.message.contains("invalid type"), "{}", error.message);
-    }
-
-    #[test]
-    fn values_are_replaced_and_comments_kept() {
-        let text = "# robot\n[plant.a]\nk = 1.0 # first\n\n[[effect]]\n[effect.b]\nat = [\"x\"]\n";
-        let source = Source::parse("m.toml", text).unwrap();
-        let new = source.with_values(&[
-            (vec!["plant".into(), "a".into(), "k".into()], -2.5),
-            (
-                vec!["effect".into(), 0.into(), "b".into(), "level".into()],
-                0.25,
-            ),
-        ]);
-        assert_eq!(
-            new,
-            "# robot\n[plant.a]\nk = -2.5 # first\n\n[[effect]]\n[effect.b]\nat = [\"x\"]\nlevel = 0.25\n"
-        );
     }
 
     #[test]

@@ -189,6 +189,37 @@ impl Real for Dual {
         let sqrt = libm::sqrt(self.value);
         self.chain(sqrt, 0.5 / sqrt)
     }
+    fn ln(self) -> Self {
+        self.chain(libm::log(self.value), 1.0 / self.value)
+    }
+    fn atan2(self, other: Self) -> Self {
+        let (y, x) = (self.value, other.value);
+        let square = x * x + y * y;
+        let mut slopes = self.slopes;
+        for (a, b) in slopes.iter_mut().zip(other.slopes) {
+            *a = (x * *a - y * b) / square;
+        }
+        Self {
+            value: libm::atan2(y, x),
+            slopes,
+        }
+    }
+    fn powf(self, exponent: Self) -> Self {
+        let (base, power) = (self.value, exponent.value);
+        let value = libm::pow(base, power);
+        let by_base = power * libm::pow(base, power - 1.0);
+        // At or below zero there is a power only where the exponent stays a whole number.
+        let by_power = if base > 0.0 {
+            value * libm::log(base)
+        } else {
+            0.0
+        };
+        let mut slopes = self.slopes;
+        for (a, b) in slopes.iter_mut().zip(exponent.slopes) {
+            *a = by_base * *a + by_power * b;
+        }
+        Self { value, slopes }
+    }
 }
 
 #[cfg(test)]

@@ -88,6 +88,9 @@ pub struct Reading<'a, S> {
     pub is_position: bool,
     /// The signals by role; roles that the effect does not declare are zero.
     pub roles: [S; Role::COUNT],
+    /// All signals of the plant: states, inputs, outputs. Outputs that nobody asked for may be of
+    /// an earlier instant.
+    pub signals: &'a [S],
     /// The channel's nominal value in the past.
     pub past: &'a dyn Past<S>,
 }

@@ -139,6 +139,8 @@ pub struct Attached {
     pub(crate) physics: &'static dyn AnyPhysics,
     /// For each channel and role, the index of the signal that plays it.
     pub(crate) reads: Vec<[Option<usize>; Role::COUNT]>,
+    /// Signals it reads beside those.
+    pub(crate) signals: Vec<usize>,
 }
 
 /// A measured signal of a composed model.
@@ -211,33 +213,27 @@ impl Model {
 
     /// Composes a model from a parsed file; `source` places the errors.
     pub fn compose(file: &ModelFile, source: &Source) -> Result<Self, Box<ConfigError>> {
-        let plant = file.plant.meta();
-        let values = file.plant.values();
-        let (declared, prefix): (&'static [Parameter], Vec<Step>) = match values.set {
-            0 => (plant.parameters, vec!["plant".into(), plant.id.into()]),
-            set => {
-                let other = &plant.parameterizations[set - 1];
-                (
-                    other.parameters,
-                    vec!["plant".into(), plant.id.into(), other.id.into()],
-                )
-            }
+        let prefix: [Step; 2] = ["plant".into(), file.plant.meta().id.into()];
+        let ready = file
+            .plant
+            .ready()
+            .map_err(|mistake| source.mistake(&prefix, mistake))?;
+        let (plant, values) = (ready.meta, ready.values);
+        let declared: &'static [Parameter] = match values.set {
+            0 => plant.parameters,
+            set => plant.parameterizations[set - 1].parameters,
         };
         let mut parameters: Vec<ModelParameter> = declared
             .iter()
-            .zip(&values.given)
-            .map(|(declaration, given)| ModelParameter {
+            .zip(values.given.iter().zip(ready.paths))
+            .map(|(declaration, (given, path))| ModelParameter {
                 name: declaration.id.to_owned(),
                 declaration,
                 unit: declaration.unit.to_owned(),
                 value: given.or(declaration.default),
                 free: declaration.estimated,
                 size: 1.0,
-                path: prefix
-                    .iter()
-                    .cloned()
-                    .chain([declaration.id.into()])
-                    .collect(),
+                path: prefix.iter().cloned().chain(path).collect(),
             })
             .collect();
         let n_plant_parameters = parameters.len();
@@ -284,7 +280,7 @@ impl Model {
             measured: Vec::new(),
             log: file.log.clone(),
             max_step: step,
-            dynamics: file.plant.dynamics(),
+            dynamics: ready.dynamics,
             set: values.set,
             n_plant_parameters,
         };

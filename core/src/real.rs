@@ -49,6 +49,12 @@ pub trait Real:
     fn exp(self) -> Self;
     /// Square root; NaN below zero.
     fn sqrt(self) -> Self;
+    /// Natural logarithm; minus infinity at zero, NaN below.
+    fn ln(self) -> Self;
+    /// Angle of the point (`other`, `self`), from -π to π.
+    fn atan2(self, other: Self) -> Self;
+    /// `self^exponent`; NaN below zero, unless the exponent is a whole number.
+    fn powf(self, exponent: Self) -> Self;
 
     /// Absolute value.
     fn abs(self) -> Self {
@@ -101,6 +107,15 @@ impl Real for f32 {
     fn sqrt(self) -> Self {
         libm::sqrtf(self)
     }
+    fn ln(self) -> Self {
+        libm::logf(self)
+    }
+    fn atan2(self, other: Self) -> Self {
+        libm::atan2f(self, other)
+    }
+    fn powf(self, exponent: Self) -> Self {
+        libm::powf(self, exponent)
+    }
     fn is_finite(self) -> bool {
         f32::is_finite(self)
     }
@@ -131,6 +146,15 @@ impl Real for f64 {
     fn sqrt(self) -> Self {
         libm::sqrt(self)
     }
+    fn ln(self) -> Self {
+        libm::log(self)
+    }
+    fn atan2(self, other: Self) -> Self {
+        libm::atan2(self, other)
+    }
+    fn powf(self, exponent: Self) -> Self {
+        libm::pow(self, exponent)
+    }
 }
 
 #[cfg(all(test, feature = "std"))]
@@ -150,12 +174,16 @@ mod tests {
     fn elementary_functions_have_their_derivatives() {
         let h = 1e-6;
         type Pair = (fn(f64) -> f64, fn(Dual) -> Dual);
-        let functions: [Pair; 5] = [
+        let functions: [Pair; 9] = [
             (Real::sin, Real::sin),
             (Real::cos, Real::cos),
             (Real::tanh, Real::tanh),
             (Real::exp, Real::exp),
             (Real::sqrt, Real::sqrt),
+            (Real::ln, Real::ln),
+            (|x| Real::atan2(x, 2.0 - x), |x| x.atan2(Dual::of(2.0) - x)),
+            (|x| Real::powf(x, 1.5 * x), |x| x.powf(Dual::of(1.5) * x)),
+            (|x| Real::powf(-x, 3.0), |x| (-x).powf(Dual::of(3.0))),
         ];
         for (plain, dual) in functions {
             let numeric = (plain(0.7 + h) - plain(0.7 - h)) / (2.0 * h);

@@ -8,12 +8,13 @@
 
 use std::fmt::Debug;
 
+use crate::config::{Mistake, Step};
 pub use crate::configured::{ConfiguredEffect, ConfiguredPlant, Values, range_text};
 use crate::model::{Model, ModelError};
 use crate::run::Run;
 use crate::{
-    Controller, Driver, DriverError, DriverFault, Dual, Dynamics, EffectMeta, Estimator, Physics,
-    PlantMeta, Real,
+    Channel, Controller, Driver, DriverError, DriverFault, Dual, Dynamics, EffectMeta, Estimator,
+    Physics, PlantMeta, Real,
 };
 
 /// A scalar that composed models are run with on a host.
@@ -71,6 +72,32 @@ pub trait PlantPart: Debug + Send + Sync {
     fn values(&self) -> &Values;
     /// The equations.
     fn dynamics(&self) -> &'static dyn AnyDynamics;
+    /// The plant ready to be composed; an error where what the file says of it cannot be.
+    fn ready(&self) -> Result<ReadyPlant, Mistake> {
+        let (meta, values) = (self.meta(), self.values().clone());
+        let set = values.set.checked_sub(1);
+        let set = set.and_then(|i| meta.parameterizations.get(i));
+        let parameters = set.map_or(meta.parameters, |s| s.parameters);
+        let path = |id: &'static str| set.map(|s| s.id.into()).into_iter().chain([id.into()]);
+        Ok(ReadyPlant {
+            meta,
+            dynamics: self.dynamics(),
+            paths: parameters.iter().map(|p| path(p.id).collect()).collect(),
+            values,
+        })
+    }
+}
+
+/// A plant ready to be composed.
+pub struct ReadyPlant {
+    /// The declaration.
+    pub meta: &'static PlantMeta,
+    /// The equations.
+    pub dynamics: &'static dyn AnyDynamics,
+    /// The parameters the file gives.
+    pub values: Values,
+    /// Where each of them stands in the plant's table.
+    pub paths: Vec<Vec<Step>>,
 }
 
 /// An effect as it stands in a model file: `[effect.<id>]` in an `[[effect]]`.
@@ -84,6 +111,45 @@ pub trait EffectPart: Debug + Send + Sync {
     fn values(&self) -> &Values;
     /// The equations.
     fn physics(&self) -> &'static dyn AnyPhysics;
+    /// The key of its table that names the channels.
+    fn at_key(&self) -> &'static str {
+        "at"
+    }
+    /// The effect ready to act at these channels of a plant; an error where what the file says of
+    /// it cannot be.
+    fn ready(
+        &self,
+        plant: &'static PlantMeta,
+        at: &[&'static Channel],
+    ) -> Result<ReadyEffect, Mistake> {
+        let _ = (plant, at);
+        Ok(ReadyEffect {
+            meta: self.meta(),
+            physics: self.physics(),
+            given: self.values().given.clone(),
+            paths: self
+                .meta()
+                .parameters
+                .iter()
+                .map(|p| vec![p.id.into()])
+                .collect(),
+            signals: Vec::new(),
+        })
+    }
+}
+
+/// An effect ready to be attached.
+pub struct ReadyEffect {
+    /// The declaration.
+    pub meta: &'static EffectMeta,
+    /// The equations.
+    pub physics: &'static dyn AnyPhysics,
+    /// The parameters the file gives.
+    pub given: Vec<Option<f64>>,
+    /// Where each of them stands in the effect's table.
+    pub paths: Vec<Vec<Step>>,
+    /// Signals it reads beside those that play roles, by index among states, inputs and outputs.
+    pub signals: Vec<usize>,
 }
 
 /// What an estimator, controller or driver says about itself.
@@ -91,7 +157,7 @@ pub trait EffectPart: Debug + Send + Sync {
 pub struct PartMeta {
     /// Identifier in TOML.
     pub id: &'static str,
-    /// `estimator`, `controller` or `driver`.
+    /// `estimator`, `controller` or `driver`; `plant` or `effect` for those of [`written`].
     pub role: &'static str,
     /// One sentence.
     pub summary: &'static str,
@@ -252,6 +318,14 @@ macro_rules! declare_part {
     };
 }
 
+/// Parts that the model file itself defines, see [`crate::expression`].
+pub fn written() -> [&'static PartMeta; 2] {
+    [
+        &crate::expression::PLANT_PART,
+        &crate::expression::EFFECT_PART,
+    ]
+}
+
 /// All linked plants, by id.
 pub fn plants() -> Vec<&'static PlantMeta> {
     let mut all: Vec<_> = inventory::iter::<PlantEntry>
@@ -272,12 +346,19 @@ pub fn effects() -> Vec<&'static EffectMeta> {
     all
 }
 
-/// The equations of the effect `id`, with its declaration.
-pub(crate) fn effect(id: &str) -> Option<(&'static EffectMeta, &'static dyn AnyPhysics)> {
-    inventory::iter::<EffectEntry>
+/// The effect `id` with nothing given.
+pub(crate) fn effect(id: &str) -> Option<ReadyEffect> {
+    let entry = inventory::iter::<EffectEntry>
         .into_iter()
-        .find(|e| e.0.id == id)
-        .map(|e| (e.0, e.1))
+        .find(|e| e.0.id == id)?;
+    let parameters = entry.0.parameters;
+    Some(ReadyEffect {
+        meta: entry.0,
+        physics: entry.1,
+        given: vec![None; parameters.len()],
+        paths: parameters.iter().map(|p| vec![p.id.into()]).collect(),
+        signals: Vec::new(),
+    })
 }
 
 /// All linked estimators, controllers and drivers, by role and id.

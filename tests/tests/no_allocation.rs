@@ -138,7 +138,14 @@ fn a_controller_and_its_model_allocate_nothing() {
 
 #[test]
 fn a_simulation_allocates_nothing() {
-    for text in [PAPER.to_owned(), format!("{PAPER}{WITH_EFFECTS}")] {
+    let path = loopsight_tests::repository().join("examples/expressions");
+    let file = |name: &str| std::fs::read_to_string(path.join(name)).unwrap();
+    for text in [
+        PAPER.to_owned(),
+        format!("{PAPER}{WITH_EFFECTS}"),
+        file("robot.toml"),
+        file("twil.toml"),
+    ] {
         let model = model(&text);
         let mut simulator = Simulator::<f64>::new(&model, &model.values());
         // Longer than the memory of the delay, whose ring must not grow.

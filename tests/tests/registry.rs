@@ -10,8 +10,8 @@ use std::collections::BTreeSet;
 
 use loopsight_core::model::{Model, misfit, signals};
 use loopsight_core::registry::{
-    BuildError, ControllerPart, DriverContext, DriverPart, EstimatorPart, PartMeta, effects, parts,
-    plants,
+    BuildError, ControllerPart, DriverContext, DriverPart, EffectPart, EstimatorPart, PartMeta,
+    PlantPart, effects, parts, plants, written,
 };
 use loopsight_core::run::Run;
 use loopsight_core::sensor::Sensor;
@@ -403,6 +403,8 @@ struct Example {
     estimator: Option<Box<dyn EstimatorPart>>,
     controller: Option<Box<dyn ControllerPart>>,
     driver: Option<Box<dyn DriverPart>>,
+    plant: Option<Box<dyn PlantPart>>,
+    effect: Option<Box<dyn EffectPart>>,
 }
 
 /// The keys that a part's table takes, as the parser itself lists them.
@@ -434,32 +436,7 @@ fn estimators_controllers_and_drivers_keep_their_word() {
         load_runs: &load_runs,
     };
     for meta in parts() {
-        let of = format!("{} `{}`", meta.role, meta.id);
-        snake_case(&of, meta.id);
-        for (what, text) in [
-            ("summary", meta.summary),
-            ("equation", meta.equation),
-            ("reference", meta.reference),
-            ("example", meta.example),
-        ] {
-            said(&of, what, text);
-        }
-        distinct(&of, meta.settings.iter().map(|s| s.id));
-        for setting in meta.settings {
-            let of = format!("{of}, setting `{}`", setting.id);
-            snake_case(&of, setting.id);
-            said(&of, "doc", setting.doc);
-            if !setting.unit.is_empty() {
-                unit(&of, setting.unit);
-            }
-        }
-        let documented: BTreeSet<String> = meta.settings.iter().map(|s| s.id.to_owned()).collect();
-        assert_eq!(
-            accepted(meta),
-            documented,
-            "{of}: accepted and documented settings"
-        );
-
+        let of = says_what_it_takes(meta);
         let example: Example = toml::from_str(meta.example).unwrap();
         let built = match (&example.estimator, &example.controller, &example.driver) {
             (Some(part), None, None) => {
@@ -478,6 +455,57 @@ fn estimators_controllers_and_drivers_keep_their_word() {
         };
         built.unwrap_or_else(|error| panic!("{of}: the example does not build: {error}"));
     }
+}
+
+/// What the model file itself can define says as much of itself.
+#[test]
+fn parts_that_a_file_defines_keep_their_word() {
+    for meta in written() {
+        let of = says_what_it_takes(meta);
+        let text = match meta.role {
+            "plant" => meta.example.to_owned(),
+            _ => format!("{}\n{}", plants()[1].example, meta.example),
+        };
+        let (model, _) = Model::from_toml("example", &text).unwrap();
+        assert!(model.missing_values().is_empty(), "{of}: the example");
+        let id = match meta.role {
+            "plant" => model.plant.id,
+            _ => model.effects[0].meta.id,
+        };
+        assert_eq!(id, meta.id);
+        let n = model.parameters.len();
+        derivatives_agree(&of, model, 0..n);
+    }
+}
+
+/// What a part says of itself is there, and is what its table takes.
+fn says_what_it_takes(meta: &PartMeta) -> String {
+    let of = format!("{} `{}`", meta.role, meta.id);
+    snake_case(&of, meta.id);
+    for (what, text) in [
+        ("summary", meta.summary),
+        ("equation", meta.equation),
+        ("reference", meta.reference),
+        ("example", meta.example),
+    ] {
+        said(&of, what, text);
+    }
+    distinct(&of, meta.settings.iter().map(|s| s.id));
+    for setting in meta.settings {
+        let of = format!("{of}, setting `{}`", setting.id);
+        snake_case(&of, setting.id);
+        said(&of, "doc", setting.doc);
+        if !setting.unit.is_empty() {
+            unit(&of, setting.unit);
+        }
+    }
+    let documented: BTreeSet<String> = meta.settings.iter().map(|s| s.id.to_owned()).collect();
+    assert_eq!(
+        accepted(meta),
+        documented,
+        "{of}: accepted and documented settings"
+    );
+    of
 }
 
 #[test]

@@ -17,10 +17,13 @@ pub(crate) fn run(options: &ExplainOptions) -> Result<(), Failure> {
         effect(meta)
     } else if let Some(meta) = registry::parts().into_iter().find(|m| m.id == id) {
         part(meta)
+    } else if let Some(text) = written(id) {
+        text
     } else {
         let mut ids: Vec<&str> = registry::plants().iter().map(|m| m.id).collect();
         ids.extend(registry::effects().iter().map(|m| m.id));
         ids.extend(registry::parts().iter().map(|m| m.id));
+        ids.push(registry::written()[0].id);
         let mut message = format!("nothing is known by the id `{id}`");
         match nearest(id, ids.iter().copied()) {
             Some(near) => message.push_str(&format!("; did you mean `{near}`?")),
@@ -150,6 +153,13 @@ fn effect(meta: &EffectMeta) -> String {
     ));
     text.push_str(&tail(meta.reference, meta.example));
     text
+}
+
+/// What a model file itself can define: a plant and an effect share their id.
+fn written(id: &str) -> Option<String> {
+    let found = registry::written().into_iter().filter(|m| m.id == id);
+    let texts: Vec<String> = found.map(part).collect();
+    (!texts.is_empty()).then(|| texts.join("\n"))
 }
 
 fn part(meta: &PartMeta) -> String {

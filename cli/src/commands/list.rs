@@ -54,11 +54,20 @@ fn all() -> Vec<Entry> {
         id: m.id,
         summary: m.summary,
     }));
-    entries.extend(registry::parts().iter().map(|m| Entry {
+    let more = registry::written().into_iter().chain(registry::parts());
+    entries.extend(more.map(|m| Entry {
         role: m.role,
         id: m.id,
         summary: m.summary,
     }));
+    // Those that a model file defines stand behind the library's own.
+    let roles = ["plant", "effect"];
+    entries.sort_by_key(|e| {
+        roles
+            .iter()
+            .position(|r| *r == e.role)
+            .unwrap_or(roles.len())
+    });
     entries
 }
 

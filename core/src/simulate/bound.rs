@@ -13,6 +13,8 @@ pub(super) struct Bound {
     side: f64,
     is_position: bool,
     reads: [Option<usize>; Role::COUNT],
+    /// Signals it reads beside those.
+    signals: Vec<usize>,
     /// First of its states in the extended state vector.
     pub(super) z: usize,
     /// Number of its states.
@@ -54,6 +56,7 @@ impl Bounds {
                     is_position: matches!(channel.place, Place::Output(i)
                         if reads_position(model, channel) == Some(i)),
                     reads: *reads,
+                    signals: effect.signals.clone(),
                     z: first + bounds.states,
                     n_z: effect.meta.states,
                     history,
@@ -103,7 +106,8 @@ impl Bounds {
                     Place::Output(i) => Some(i),
                     _ => None,
                 };
-                b.reads.iter().flatten().copied().chain(own)
+                let named = b.reads.iter().flatten().chain(&b.signals);
+                named.copied().chain(own)
             })
     }
 }
@@ -131,7 +135,7 @@ impl<S: HostReal> Scene<'_, S> {
         &self.model.effects[bound.effect]
     }
 
-    fn reading<'p>(&self, bound: &Bound, nominal: S, past: &'p dyn Past<S>) -> Reading<'p, S> {
+    fn reading<'p>(&'p self, bound: &Bound, nominal: S, past: &'p dyn Past<S>) -> Reading<'p, S> {
         let mut roles = [S::zero(); Role::COUNT];
         for (role, read) in roles.iter_mut().zip(&bound.reads) {
             if let Some(index) = read {
@@ -146,6 +150,7 @@ impl<S: HostReal> Scene<'_, S> {
             side: S::of(bound.side),
             is_position: bound.is_position,
             roles,
+            signals: self.signals,
             past,
         }
     }

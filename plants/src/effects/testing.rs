@@ -12,6 +12,7 @@ pub(super) fn reading(roles: &[(Role, f64)]) -> Reading<'static, f64> {
         side: 0.0,
         is_position: false,
         roles: [0.0; Role::COUNT],
+        signals: &[],
         past: &NoPast,
     };
     for (role, value) in roles {
@@ -30,6 +31,7 @@ pub(super) fn dual_reading(nominal: f64) -> Reading<'static, Dual> {
         side: Dual::of(0.0),
         is_position: false,
         roles: [Dual::of(0.0); Role::COUNT],
+        signals: &[],
         past: &NoPast,
     }
 }

@@ -1,0 +1,112 @@
+//! Writing into a file, so that everything else stays as it was written.
+
+use toml_edit::Item;
+
+use super::{Source, Step};
+
+impl Source {
+    /// The text with numbers replaced or added at the paths given; everything else, comments
+    /// included, stays as it was written.
+    pub fn with_values(&self, values: &[(Vec<Step>, f64)]) -> String {
+        let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
+            return self.text.clone();
+        };
+        for (path, value) in values {
+            set_value(document.as_item_mut(), path, *value);
+        }
+        document.to_string()
+    }
+
+    /// The text with an `[[effect]]` at the end of those it has: its id, channels and parameters.
+    pub fn with_effect(&self, id: &str, at: &[&str], parameters: &[(&str, f64)]) -> String {
+        let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
+            return self.text.clone();
+        };
+        let mut part = toml_edit::Table::new();
+        part.insert(
+            "at",
+            toml_edit::value(at.iter().copied().collect::<toml_edit::Array>()),
+        );
+        for (name, value) in parameters {
+            part.insert(name, toml_edit::value(*value));
+        }
+        let mut entry = toml_edit::Table::new();
+        entry.insert(id, Item::Table(part));
+        let effects = document
+            .entry("effect")
+            .or_insert(Item::ArrayOfTables(toml_edit::ArrayOfTables::new()));
+        match effects {
+            Item::ArrayOfTables(effects) => effects.push(entry),
+            // `effect = []`, as an inline array
+            other => {
+                let mut effects = toml_edit::ArrayOfTables::new();
+                effects.push(entry);
+                *other = Item::ArrayOfTables(effects);
+            }
+        }
+        document.to_string()
+    }
+}
+
+/// Sets the number at `path` below `item`, keeping what stands around it.
+fn set_value(item: &mut Item, path: &[Step], value: f64) {
+    match path {
+        [] => {}
+        [Step::Key(key)] => {
+            let is_new = item.get(key).is_none();
+            if let Some(inline) = item.as_inline_table_mut().filter(|_| is_new)
+                && let Some((_, last)) = inline.iter_mut().last()
+            {
+                // The space before the closing brace goes to the new last value.
+                last.decor_mut().set_suffix("");
+            }
+            let Some(table) = item.as_table_like_mut() else {
+                return;
+            };
+            let mut new = toml_edit::Value::from(value);
+            if let Some(old) = table.get(key).and_then(Item::as_value) {
+                *new.decor_mut() = old.decor().clone();
+            }
+            table.insert(key, Item::Value(new));
+        }
+        [Step::Key(key), rest @ ..] => {
+            let next = item.as_table_like_mut().and_then(|t| t.get_mut(key));
+            if let Some(next) = next {
+                set_value(next, rest, value);
+            }
+        }
+        [Step::Index(index), rest @ ..] => {
+            let table = item
+                .as_array_of_tables_mut()
+                .and_then(|a| a.get_mut(*index));
+            let [Step::Key(part), rest @ ..] = rest else {
+                return;
+            };
+            if let Some(next) = table.and_then(|t| t.get_mut(part)) {
+                set_value(next, rest, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_replaced_and_comments_kept() {
+        let text = "# robot\n[plant.a]\nk = 1.0 # first\n\n[[effect]]\n[effect.b]\nat = [\"x\"]\n";
+        let source = Source::parse("m.toml", text).unwrap();
+        let new = source.with_values(&[
+            (vec!["plant".into(), "a".into(), "k".into()], -2.5),
+            (
+                vec!["effect".into(), 0.into(), "b".into(), "level".into()],
+                0.25,
+            ),
+        ]);
+        assert_eq!(
+            new,
+            "# robot\n[plant.a]\nk = -2.5 # first\n\n[[effect]]\n[effect.b]\nat = [\"x\"]\nlevel = 0.25\n"
+        );
+    }
+}

@@ -1,0 +1,407 @@
+//! From the text of an expression to its tree.
+//!
+//! exmex knows which operator binds more tightly; it knows no places. So the words are checked
+//! here, one behind the other, where a mistake can still be pointed at. What is handed over is
+//! right and has every operand by its number: `{0} * {1}`.
+
+use std::ops::Range;
+
+use exmex::{BinOp, Express, FlatEx, MakeOperators, Operator};
+
+use super::lexer::{Word, words};
+use super::operation::{Binary, CONSTANTS, FUNCTIONS, Function, Unary, constant, function};
+use super::program::MOST_LEAVES;
+use super::tree::Tree;
+use super::{ExpressionError, Names};
+use crate::config::nearest;
+
+/// Deepest nesting of parentheses.
+const DEEPEST: usize = 40;
+
+/// Reads an expression; `names` says what the names in it are.
+pub(crate) fn parse(text: &str, names: &dyn Names) -> Result<Tree, ExpressionError> {
+    let mut reader = Reader {
+        text,
+        names,
+        operands: Vec::new(),
+        written: String::new(),
+        open: vec![Level::default()],
+        sign: false,
+        operator: None,
+    };
+    // A sign is `0 - x` that binds tighter than a product.
+    reader.operands.push(Tree::Number(0.0));
+    let words = words(text)?;
+    let mut wanted = Wanted::Operand;
+    for (i, (word, place)) in words.iter().enumerate() {
+        let called = matches!(words.get(i + 1), Some((Word::Open, _)));
+        wanted = match wanted {
+            Wanted::Operand => reader.operand(*word, place, called)?,
+            Wanted::Open => {
+                if let Some(level) = reader.level() {
+                    level.place = place.clone();
+                }
+                reader.written.push_str("( ");
+                Wanted::Operand
+            }
+            Wanted::Operator => reader.operator(*word, place)?,
+        };
+    }
+    reader.end(wanted)?;
+    let tree = evaluate(&reader.written, &reader.operands)
+        .map_err(|why| ExpressionError::at(0..text.len(), format!("cannot be read: {why}")))?;
+    if tree.has_bad_number() {
+        let message = "a part of this without names is not a finite number";
+        return Err(ExpressionError::at(0..text.len(), message));
+    }
+    if tree.size() > MOST_LEAVES {
+        return Err(ExpressionError::at(
+            0..text.len(),
+            "the expression is too long",
+        ));
+    }
+    Ok(tree)
+}
+
+/// What must come next.
+#[derive(Clone, Copy, PartialEq)]
+enum Wanted {
+    /// A number, a name, an opening parenthesis or a sign.
+    Operand,
+    /// The parenthesis behind the name of a function.
+    Open,
+    /// An operator, a closing parenthesis, or the end.
+    Operator,
+}
+
+/// Inside one pair of parentheses.
+#[derive(Clone, Default)]
+struct Level {
+    /// Where it was opened.
+    place: Range<usize>,
+    /// The function called, and how many commas are still to come.
+    call: Option<(&'static str, usize)>,
+    /// A comma is an operator in exmex: two more parentheses keep its sides together.
+    two: bool,
+    /// There is a power among the last factors.
+    power: bool,
+}
+
+struct Reader<'t> {
+    text: &'t str,
+    names: &'t dyn Names,
+    operands: Vec<Tree>,
+    written: String,
+    open: Vec<Level>,
+    /// The last word was a sign.
+    sign: bool,
+    /// The last word, when it was an operator.
+    operator: Option<char>,
+}
+
+impl Reader<'_> {
+    fn level(&mut self) -> Option<&mut Level> {
+        self.open.last_mut()
+    }
+
+    fn push(&mut self, tree: Tree) -> Wanted {
+        let written = format!("{{{}}} ", self.operands.len());
+        self.written.push_str(&written);
+        self.operands.push(tree);
+        self.sign = false;
+        self.operator = None;
+        Wanted::Operator
+    }
+
+    fn operand(
+        &mut self,
+        word: Word<'_>,
+        place: &Range<usize>,
+        called: bool,
+    ) -> Result<Wanted, ExpressionError> {
+        match word {
+            Word::Number(x) => Ok(self.push(Tree::Number(x))),
+            Word::Name(name) => self.name(name, place, called),
+            Word::Open => {
+                self.nest(place, None, false)?;
+                Ok(Wanted::Operand)
+            }
+            Word::Operator('-' | '+') if self.sign => {
+                let error = ExpressionError::at(place.clone(), "a second sign");
+                Err(error.help("one of them is enough, or parentheses around the inner one"))
+            }
+            Word::Operator('-') => {
+                // In an exponent the sign belongs to the operator: `2^-x`.
+                if self.operator == Some('^') {
+                    self.written.truncate(self.written.trim_end().len());
+                    self.written.push_str("- ");
+                } else {
+                    self.written.push_str("{0} ~ ");
+                }
+                self.sign = true;
+                Ok(Wanted::Operand)
+            }
+            Word::Operator('+') => {
+                self.sign = true;
+                Ok(Wanted::Operand)
+            }
+            Word::Operator(_) | Word::Close | Word::Comma => Err(ExpressionError::at(
+                place.clone(),
+                format!(
+                    "a number or a name is missing before `{}`",
+                    &self.text[place.clone()]
+                ),
+            )),
+        }
+    }
+
+    fn name(
+        &mut self,
+        name: &str,
+        place: &Range<usize>,
+        called: bool,
+    ) -> Result<Wanted, ExpressionError> {
+        let known = constant(name)
+            .map(|x| Ok(Tree::Number(x)))
+            .or_else(|| self.names.find(name));
+        if called {
+            let entry = FUNCTIONS.iter().find(|(n, _)| *n == name);
+            return match entry {
+                Some((name, Function::One(_))) => {
+                    self.written.push_str(name);
+                    self.written.push(' ');
+                    self.call(name, 0, place)
+                }
+                Some((name, Function::Two(_))) => self.call(name, 1, place),
+                None if known.is_some() => {
+                    let message = format!("`{name}` is no function");
+                    let help = format!("a product is written `{name} * (…)`");
+                    Err(ExpressionError::at(place.clone(), message).help(help))
+                }
+                None => Err(unknown(
+                    &format!("unknown function `{name}`"),
+                    name,
+                    place,
+                    FUNCTIONS.iter().map(|(n, _)| *n),
+                )),
+            };
+        }
+        match known {
+            Some(Ok(tree)) => Ok(self.push(tree)),
+            Some(Err(message)) => Err(ExpressionError::at(place.clone(), message)),
+            None if function(name).is_some() => {
+                let message = format!("the function `{name}` needs its argument in parentheses");
+                Err(ExpressionError::at(place.clone(), message))
+            }
+            None => {
+                let known = self.names.known();
+                let constants = CONSTANTS.iter().map(|(n, _)| *n);
+                let names = known.iter().map(String::as_str);
+                Err(unknown(
+                    &format!("unknown name `{name}`"),
+                    name,
+                    place,
+                    names.chain(constants),
+                ))
+            }
+        }
+    }
+
+    fn call(
+        &mut self,
+        name: &'static str,
+        commas: usize,
+        place: &Range<usize>,
+    ) -> Result<Wanted, ExpressionError> {
+        self.nest(place, Some((name, commas)), commas > 0)?;
+        Ok(Wanted::Open)
+    }
+
+    /// Opens a parenthesis; that of a call is written when it comes.
+    fn nest(
+        &mut self,
+        place: &Range<usize>,
+        call: Option<(&'static str, usize)>,
+        two: bool,
+    ) -> Result<(), ExpressionError> {
+        if self.open.len() > DEEPEST {
+            let message = format!("more than {DEEPEST} parentheses within each other");
+            return Err(ExpressionError::at(place.clone(), message));
+        }
+        if two || call.is_none() {
+            self.written.push_str("( ");
+        }
+        self.open.push(Level {
+            place: place.clone(),
+            call,
+            two,
+            power: false,
+        });
+        self.sign = false;
+        self.operator = None;
+        Ok(())
+    }
+
+    fn operator(
+        &mut self,
+        word: Word<'_>,
+        place: &Range<usize>,
+    ) -> Result<Wanted, ExpressionError> {
+        let wrong = |message: String| Err(ExpressionError::at(place.clone(), message));
+        match word {
+            Word::Operator(c) => {
+                let Some(level) = self.level() else {
+                    return Ok(Wanted::Operand);
+                };
+                if c == '^' && level.power {
+                    let error = ExpressionError::at(place.clone(), "a power of a power");
+                    return Err(
+                        error.help("say with parentheses which is meant: `(a^b)^c` or `a^(b^c)`")
+                    );
+                }
+                level.power = c == '^';
+                self.operator = Some(c);
+                self.written.push(c);
+                self.written.push(' ');
+                Ok(Wanted::Operand)
+            }
+            Word::Close => {
+                if self.open.len() < 2 {
+                    return wrong("this parenthesis was never opened".to_owned());
+                }
+                let Some(level) = self.open.pop() else {
+                    return Ok(Wanted::Operator);
+                };
+                if let Some((name, 1)) = level.call {
+                    return wrong(format!("`{name}` takes two arguments, found one"));
+                }
+                self.written.push_str(if level.two { ") ) " } else { ") " });
+                Ok(Wanted::Operator)
+            }
+            Word::Comma => {
+                let Some(level) = self.level() else {
+                    return Ok(Wanted::Operand);
+                };
+                level.power = false;
+                match level.call {
+                    Some((name, 1)) => {
+                        level.call = Some((name, 0));
+                        self.written.push_str(") ");
+                        self.written.push_str(name);
+                        self.written.push_str(" ( ");
+                        Ok(Wanted::Operand)
+                    }
+                    Some((name, _)) => {
+                        let takes = if level.two {
+                            "two arguments"
+                        } else {
+                            "one argument"
+                        };
+                        wrong(format!("`{name}` takes {takes}"))
+                    }
+                    None => wrong("a comma stands between the arguments of a function".to_owned()),
+                }
+            }
+            Word::Number(_) | Word::Name(_) | Word::Open => wrong(format!(
+                "an operator is missing before `{}`",
+                &self.text[place.clone()]
+            )),
+        }
+    }
+
+    fn end(&self, wanted: Wanted) -> Result<(), ExpressionError> {
+        let end = self.text.trim_end().len();
+        let last = self.text[..end].char_indices().next_back();
+        let place = last.map_or(0..0, |(i, _)| i..end);
+        if wanted != Wanted::Operator {
+            let message = if last.is_none() {
+                "there is no expression"
+            } else {
+                "the expression ends where a number or a name is expected"
+            };
+            return Err(ExpressionError::at(place, message));
+        }
+        match self.open.last() {
+            Some(level) if self.open.len() > 1 => {
+                let message = "the parenthesis that begins here is never closed";
+                Err(ExpressionError::at(level.place.clone(), message))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn unknown<'n>(
+    what: &str,
+    name: &str,
+    place: &Range<usize>,
+    known: impl Iterator<Item = &'n str>,
+) -> ExpressionError {
+    let known: Vec<&str> = known.collect();
+    let message = format!("{what}, expected one of {}", known.join(", "));
+    let error = ExpressionError::at(place.clone(), message);
+    match nearest(name, known) {
+        Some(near) => error.help(format!("did you mean `{near}`?")),
+        None => error,
+    }
+}
+
+/// The operators of an expression, for exmex.
+#[derive(Clone, Debug)]
+struct Operators;
+
+macro_rules! binary {
+    ($text:literal, $prio:literal, $operation:expr) => {
+        Operator::make_bin(
+            $text,
+            BinOp {
+                apply: $operation,
+                prio: $prio,
+                is_commutative: false,
+            },
+        )
+    };
+}
+
+macro_rules! calls {
+    ($($text:literal: $operation:ident),*) => {
+        vec![$(Operator::make_unary($text, |x| Tree::one(Unary::$operation, x))),*]
+    };
+}
+
+impl MakeOperators<Tree> for Operators {
+    fn make<'a>() -> Vec<Operator<'a, Tree>> {
+        let mut all = calls![
+            "abs": Abs, "sign": Sign, "sqrt": Sqrt, "exp": Exp, "ln": Ln, "sin": Sin, "cos": Cos,
+            "tan": Tan, "asin": Asin, "acos": Acos, "atan": Atan, "sinh": Sinh, "cosh": Cosh,
+            "tanh": Tanh
+        ];
+        all.extend([
+            binary!("+", 1, |a, b| Tree::two(Binary::Add, a, b)),
+            binary!("-", 1, |a, b| Tree::two(Binary::Subtract, a, b)),
+            binary!("*", 2, |a, b| Tree::two(Binary::Multiply, a, b)),
+            binary!("/", 2, |a, b| Tree::two(Binary::Divide, a, b)),
+            binary!("~", 3, |_, b| Tree::one(Unary::Negate, b)),
+            binary!("^", 4, |a, b| Tree::two(Binary::Power, a, b)),
+            binary!("^-", 4, |a, b| {
+                Tree::two(Binary::Power, a, Tree::one(Unary::Negate, b))
+            }),
+            binary!("min", 5, |a, b| Tree::two(Binary::Min, a, b)),
+            binary!("max", 5, |a, b| Tree::two(Binary::Max, a, b)),
+            binary!("atan2", 5, |a, b| Tree::two(Binary::Atan2, a, b)),
+        ]);
+        all
+    }
+}
+
+/// What exmex makes of an expression whose operands are numbered.
+fn evaluate(written: &str, operands: &[Tree]) -> Result<Tree, String> {
+    let expression = FlatEx::<Tree, Operators>::parse(written).map_err(|e| e.msg().to_owned())?;
+    let values: Option<Vec<Tree>> = expression
+        .var_names()
+        .iter()
+        .map(|name| operands.get(name.parse::<usize>().ok()?).cloned())
+        .collect();
+    let values = values.ok_or("an operand is missing")?;
+    expression.eval(&values).map_err(|e| e.msg().to_owned())
+}
