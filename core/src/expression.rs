@@ -2,10 +2,12 @@
 //!
 //! `[effect.expression]` and `[plant.expression]` are read here; how they are written is told in
 //! `docs/own-in-toml.md`. Behind the registry such a part is like any other: a declaration with
-//! parameters, and equations for any scalar. The text of an expression becomes a tree ([`parse`],
-//! with exmex) and then a flat [`program`](self) that allocates nothing.
+//! parameters, and equations for any scalar. The text of an expression becomes a tree
+//! (with exmex, which knows the precedence) and then a flat program that allocates nothing.
 
+mod at_channels;
 mod channels;
+mod described;
 mod draft;
 mod effect;
 mod equations;
@@ -14,6 +16,7 @@ mod lexer;
 mod operation;
 mod parse;
 mod plant;
+mod precedence;
 mod program;
 mod table;
 #[cfg(test)]
@@ -23,9 +26,8 @@ mod tree;
 use std::ops::Range;
 
 use crate::config::{At, Mistake, Step};
+pub(crate) use described::{EFFECT_PART, PLANT_PART};
 pub use draft::{EffectDraft, ParameterDraft};
-pub(crate) use effect::EFFECT_PART;
-pub(crate) use plant::PLANT_PART;
 use tree::Tree;
 
 /// A mistake in an expression.

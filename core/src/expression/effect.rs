@@ -2,56 +2,20 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::at_channels::{AtChannels, HERE_NAMES, PARAMETERS, ROLES, SIGNALS, slot};
+use super::described::EFFECT_PART;
 use super::keep::{self, Kept};
 use super::parse::parse;
-use super::program::{FIRST_BANK, Program};
+use super::placed;
+use super::program::Program;
 use super::table::{Ordered, ParameterTable, check_name, check_unit, check_used};
-use super::tree::{Slot, Tree};
-use super::{Names, placed};
+use super::tree::Tree;
 use crate::attach::unit_at;
 use crate::config::{Mistake, Step};
 use crate::model::signals;
-use crate::registry::{AnyPhysics, EffectPart, PartMeta, ReadyEffect, Setting, Values, effects};
+use crate::registry::{AnyPhysics, EffectPart, ReadyEffect, Values, effects};
 use crate::{
     Channel, Dual, EffectMeta, Parameter, Physics, PlaceKind, PlantMeta, Reading, Real, Role,
-};
-
-/// What is known of effects as expressions before one is read.
-pub(crate) const EFFECT_PART: PartMeta = PartMeta {
-    id: "expression",
-    role: "effect",
-    summary: "an effect of your own, as an expression in the model file",
-    equation: "w = force(flow, position, drive, …, nominal, side, time, signals; parameters)",
-    reference: "docs/own-in-toml.md",
-    example: "[[effect]]
-[effect.expression]
-at = [\"wheel.right\", \"wheel.left\"]
-force = \"-c * tanh(flow / s)\"
-
-[effect.expression.parameters]
-c = { value = 0.9, unit = \"V\", range = [0.0, 12.0], doc = \"size of the friction\" }
-s = { value = 0.1, unit = \"rad/s\", above = 0.0, held = true, doc = \"width of the smoothing\" }
-",
-    settings: &[
-        Setting::new("at", "", "the channels it acts on; `on` is the same"),
-        Setting::new("on", "", "the same as `at`"),
-        Setting::new(
-            "force",
-            "",
-            "what is added there, in the channel's unit; names: the channel's roles (flow, position, drive, …), nominal, side, time, signals of the plant, the parameters",
-        ),
-        Setting::new(
-            "name",
-            "",
-            "name in reports and of its parameters; `expression` without it",
-        ),
-        Setting::new("summary", "", "one sentence for reports"),
-        Setting::new(
-            "parameters",
-            "",
-            "a table for each: value, unit, range (or above, below), held, scale, symbol, doc; or just a number",
-        ),
-    ],
 };
 
 /// `[effect.expression]`, as written.
@@ -78,13 +42,6 @@ struct Law {
     /// Signals it reads by their own name.
     signals: Vec<usize>,
 }
-
-const PARAMETERS: u8 = FIRST_BANK;
-const ROLES: u8 = FIRST_BANK + 1;
-const SIGNALS: u8 = FIRST_BANK + 2;
-const HERE: u8 = FIRST_BANK + 3;
-/// What an effect sees beside signals, in this order.
-const HERE_NAMES: [&str; 3] = ["nominal", "side", "time"];
 
 macro_rules! physics {
     ($($scalar:ty),*) => {$(
@@ -117,90 +74,6 @@ macro_rules! physics {
     )*};
 }
 physics!(f32, f64, Dual);
-
-/// The names at some channels of a plant.
-struct AtChannels<'a> {
-    plant: &'static PlantMeta,
-    at: &'a [&'static Channel],
-    parameters: &'a Ordered<ParameterTable>,
-}
-
-impl AtChannels<'_> {
-    fn signal(&self, id: &str) -> Option<usize> {
-        signals(self.plant).position(|s| s.id == id)
-    }
-
-    /// The role of this name; where the plant has no signal `speed` that is the flow.
-    fn role(&self, name: &str) -> Option<Role> {
-        let other = name == "speed" && self.signal(name).is_none();
-        let id = if other { Role::Flow.id() } else { name };
-        Role::ALL.into_iter().find(|r| r.id() == id)
-    }
-
-    /// A role wins over a signal of the same name, unless they are different things.
-    fn reading(&self, role: Role, name: &str) -> Result<Slot, String> {
-        let played: Vec<Option<&str>> = self.at.iter().map(|c| c.read(role)).collect();
-        let signal = self.signal(name);
-        let of_role = slot(ROLES, role as usize);
-        match signal {
-            Some(index) if played.iter().flatten().all(|p| *p == name) => Ok(slot(SIGNALS, index)),
-            Some(_) => Err(format!(
-                "`{name}` is a signal of the plant, and the {} at `{}` is another",
-                role.name(),
-                self.at.first().map_or("", |c| c.id)
-            )),
-            None => match self.at.iter().find(|c| c.read(role).is_none()) {
-                Some(channel) => {
-                    let offered: Vec<&str> = channel.reads.iter().map(|r| r.0.id()).collect();
-                    Err(format!(
-                        "the channel `{}` offers no {}, it offers {}",
-                        channel.id,
-                        role.name(),
-                        offered.join(", ")
-                    ))
-                }
-                None => Ok(of_role),
-            },
-        }
-    }
-}
-
-impl Names for AtChannels<'_> {
-    fn find(&self, name: &str) -> Option<Result<Tree, String>> {
-        if let Some(index) = self.parameters.position(name) {
-            return Some(Ok(Tree::Name(slot(PARAMETERS, index))));
-        }
-        if let Some(index) = HERE_NAMES.iter().position(|n| *n == name) {
-            return Some(Ok(Tree::Name(slot(HERE, index))));
-        }
-        if let Some(role) = self.role(name) {
-            return Some(self.reading(role, name).map(Tree::Name));
-        }
-        self.signal(name)
-            .map(|index| Ok(Tree::Name(slot(SIGNALS, index))))
-    }
-
-    fn known(&self) -> Vec<String> {
-        let everywhere = |r: &Role| self.at.iter().all(|c| c.read(*r).is_some());
-        let roles = Role::ALL.into_iter().filter(everywhere).map(Role::id);
-        let own = self.parameters.ids().map(str::to_owned);
-        let read = roles.chain(HERE_NAMES).map(str::to_owned);
-        let mut names: Vec<String> = own.chain(read).collect();
-        for signal in signals(self.plant) {
-            if !names.iter().any(|n| n == signal.id) {
-                names.push(signal.id.to_owned());
-            }
-        }
-        names
-    }
-}
-
-fn slot(bank: u8, index: usize) -> Slot {
-    Slot {
-        bank,
-        index: index as u16,
-    }
-}
 
 impl EffectTable {
     /// What this table comes to at some channels; made once for the same text.

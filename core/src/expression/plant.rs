@@ -3,67 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::channels::{ChannelTable, declared, implied};
+use super::described::PLANT_PART;
 use super::equations::{Equations, Law};
 use super::keep::{self, Kept};
 use super::table::{Ordered, ParameterTable, check_name, check_unit};
 use crate::config::{Mistake, Step, nearest};
-use crate::registry::{AnyDynamics, PartMeta, PlantPart, ReadyPlant, Setting, Values};
+use crate::registry::{AnyDynamics, PlantPart, ReadyPlant, Values};
 use crate::{Channel, Dynamics, Parameter, Place, PlantMeta, Real, Signal};
-
-/// What is known of plants as expressions before one is read.
-pub(crate) const PLANT_PART: PartMeta = PartMeta {
-    id: "expression",
-    role: "plant",
-    summary: "a plant of your own, as expressions in the model file",
-    equation: "x_i' = rate_i(states, inputs, outputs, efforts; parameters);  y_j = value_j(states, inputs, outputs; parameters)",
-    reference: "docs/own-in-toml.md",
-    example: "[plant.expression.states]
-angle = { unit = \"rad\", rate = \"speed\" }
-speed = { unit = \"rad/s\", rate = \"k * (voltage + shaft) - a * sin(angle) - d * speed\" }
-
-[plant.expression.inputs]
-voltage = { unit = \"V\" }
-
-[plant.expression.channels]
-shaft = { unit = \"V\", flow = \"speed\", position = \"angle\", drive = \"voltage\" }
-
-[plant.expression.parameters]
-k = { value = 3.0, unit = \"rad/s^2/V\" }
-a = { value = 20.0, unit = \"rad/s^2\", range = [0.0, 100.0] }
-d = { value = 0.5, unit = \"1/s\", range = [0.0, 10.0] }
-",
-    settings: &[
-        Setting::new(
-            "states",
-            "",
-            "a table for each: unit, rate (an expression), doc, symbol, size",
-        ),
-        Setting::new("inputs", "", "a table for each: unit, doc, symbol, size"),
-        Setting::new(
-            "outputs",
-            "",
-            "a table for each: unit, value (an expression), integral_of, doc, symbol, size",
-        ),
-        Setting::new(
-            "channels",
-            "",
-            "a table for each: unit, the signals that play roles (flow, position, drive, …), side, size, doc; an effort, whose name stands in the rates, or at an `input`, `rate` or `output`",
-        ),
-        Setting::new(
-            "parameters",
-            "",
-            "a table for each: value, unit, range (or above, below), held, scale, symbol, doc; or just a number",
-        ),
-        Setting::new(
-            "controlled",
-            "",
-            "the states a velocity controller acts on, as many as inputs",
-        ),
-        Setting::new("summary", "", "one sentence for reports"),
-        Setting::new("assumptions", "", "what was assumed"),
-        Setting::new("reference", "", "where the equations come from"),
-    ],
-};
 
 /// `[plant.expression]`, as written.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -223,7 +169,7 @@ impl PlantTable {
             .filter_map(|c| self.states.position(c.id.strip_prefix("effort.")?))
             .collect();
         channels.extend(more);
-        let controlled = self.controlled(&equations)?;
+        let controlled = self.controlled(&equations, &integrals)?;
         let mut parameters: Vec<Parameter> = Vec::new();
         for (index, (id, table)) in self.parameters.iter().enumerate() {
             let parameter = table.declare(id, equations.is_linear(self, index))?;
@@ -257,9 +203,25 @@ impl PlantTable {
         Ok(Plant { meta, law })
     }
 
-    /// The states a controller acts on: as many as inputs, each affine in them.
-    fn controlled(&self, equations: &Equations) -> Result<Vec<usize>, Mistake> {
+    /// The states a controller acts on: as many as inputs, each affine in them. Where the file is
+    /// silent, those that are more than an integral, if they are such states.
+    fn controlled(
+        &self,
+        equations: &Equations,
+        integrals: &[(&str, &str)],
+    ) -> Result<Vec<usize>, Mistake> {
         let mut found = Vec::new();
+        if self.controlled.is_empty() {
+            let ids = self.states.ids().enumerate();
+            found.extend(
+                ids.filter(|(_, id)| integrals.iter().all(|(_, integral)| integral != id))
+                    .map(|(state, _)| state),
+            );
+            let fit = found.len() == self.inputs.len();
+            if !(fit && found.iter().all(|state| equations.is_affine(*state))) {
+                found.clear();
+            }
+        }
         for (i, id) in self.controlled.iter().enumerate() {
             let path: [Step; 2] = ["controlled".into(), i.into()];
             let Some(state) = self.states.position(id) else {

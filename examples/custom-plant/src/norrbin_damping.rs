@@ -71,6 +71,7 @@ mod tests {
             side: 0.0,
             is_position: false,
             roles,
+            signals: &[],
             past: &NoPast,
         };
         NorrbinDamping::contribution(&reading, &[], &[4.0])

@@ -1,0 +1,138 @@
+//! Fits and diagnoses of models with expressions: what their numbers say is found.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "helpers of tests: a failure is the test's failure"
+)]
+
+use std::collections::BTreeMap;
+
+use loopsight_core::excitation::{Excitation, build, sample_rows};
+use loopsight_core::model::Model;
+use loopsight_core::registry::plants;
+use loopsight_core::run::Run;
+use loopsight_diagnosis::fit::fit;
+use loopsight_diagnosis::{Conclusion, FitSettings, diagnose};
+use loopsight_drivers::{Simulated, simulate_inputs};
+use loopsight_tests::{instants, repository, unknown};
+
+/// An axis with two states, a quadratic drag of its own, and a tachometer.
+const AXIS: &str = "[plant.expression.states]
+speed = { unit = \"rad/s\", rate = \"K_A * speed + K_C * (voltage + shaft)\" }
+angle = { unit = \"rad\", rate = \"speed\" }
+[plant.expression.inputs]
+voltage = { unit = \"V\" }
+[plant.expression.channels]
+shaft = { unit = \"V\", flow = \"speed\", position = \"angle\", drive = \"voltage\", shaft = \"angle\" }
+[plant.expression.parameters]
+K_A = { value = -4.0, unit = \"1/s\" }
+K_C = { value = 3.0, unit = \"rad/s^2/V\" }
+[[effect]]
+[effect.expression]
+name = \"drag\"
+at = [\"shaft\"]
+force = \"-b * flow * abs(flow) - c * tanh(flow / s)\"
+[effect.expression.parameters]
+b = { value = 0.05, unit = \"V/(rad/s)^2\", range = [0.0, 1.0] }
+c = { value = 0.6, unit = \"V\", range = [0.0, 5.0] }
+s = { value = 0.05, unit = \"rad/s\", held = true }
+[log.measured.speed]
+";
+
+const FRICTION: &str = "
+[[effect]]
+[effect.coulomb_friction]
+at = [\"shaft\"]
+level = 0.7
+width = 0.1
+";
+
+fn model(text: &str) -> Model {
+    Model::from_toml("model.toml", text).unwrap().0
+}
+
+/// 12 s of voltages at several levels, with noise on the speed.
+fn record(model: &Model) -> Run {
+    let time = instants(12.0);
+    let levels = Excitation::MultiLevel {
+        amplitude: 6.0,
+        hold_s: 0.4,
+        levels: 7,
+        seed: 7,
+        common: false,
+    };
+    let given = BTreeMap::from([("voltage".to_owned(), levels)]);
+    let inputs = sample_rows(&build(&given, model.plant.inputs).unwrap(), &time);
+    let settings = Simulated {
+        seed: 4,
+        noise: BTreeMap::from([("speed".to_owned(), 0.02)]),
+        ..Simulated::default()
+    };
+    simulate_inputs(model, &settings, &time, &inputs).unwrap()
+}
+
+/// From nothing but the ranges, a fit finds what the recording was made with.
+#[test]
+fn a_fit_finds_the_parameters_of_expressions() {
+    let truth = model(AXIS);
+    let run = record(&truth);
+    let settings = FitSettings::default();
+    let found = fit(
+        &unknown(truth.clone()),
+        &[run],
+        None,
+        &[],
+        &settings,
+        &|_, _| {},
+    )
+    .unwrap();
+    let mut checked = 0;
+    for parameter in truth.parameters.iter().filter(|p| p.free) {
+        let estimate = &found.parameters[&parameter.name];
+        let error = estimate.std_error.unwrap();
+        let value = parameter.value.unwrap();
+        assert!(
+            (estimate.value - value).abs() < 4.0 * error && error < 0.1 * value.abs(),
+            "{}: {} ± {error}, made with {value}",
+            parameter.name,
+            estimate.value
+        );
+        checked += 1;
+    }
+    assert_eq!(checked, 4);
+}
+
+/// Effects of the library are candidates at the channels of a plant of one's own.
+#[test]
+fn a_diagnosis_names_what_an_expression_plant_lacks() {
+    let plain = AXIS.replace(" - c * tanh(flow / s)", "");
+    let kept = |line: &&str| !line.starts_with("c = ") && !line.starts_with("s = ");
+    let plain: String = plain.lines().filter(kept).flat_map(|l| [l, "\n"]).collect();
+    let run = record(&model(&format!("{plain}{FRICTION}")));
+    let diagnosis = diagnose(&model(&plain), &[run], None, &[], &|_, _| {}).unwrap();
+    assert_eq!(diagnosis.verdict, Conclusion::EffectMissing);
+    let best = &diagnosis.candidates[0];
+    assert_eq!(
+        (best.place.effect.as_str(), best.place.at.as_slice()),
+        ("coulomb_friction", &["shaft".to_owned()][..])
+    );
+}
+
+/// The files that the documentation is about, and the entries in it.
+#[test]
+fn what_is_documented_works() {
+    assert!(!plants().is_empty());
+    let page = std::fs::read_to_string(repository().join("docs/own-in-toml.md")).unwrap();
+    let blocks: Vec<&str> = page
+        .split("```toml\n")
+        .skip(1)
+        .map(|b| b.split("```").next().unwrap())
+        .collect();
+    assert_eq!(blocks.len(), 2);
+    let twil = std::fs::read_to_string(repository().join("examples/twil/model.toml")).unwrap();
+    let with = model(&format!("{twil}\n{}", blocks[0]));
+    assert_eq!(with.effects[0].at.len(), 2);
+    let pendulum = model(blocks[1]);
+    assert_eq!(pendulum.parameters.len(), 4);
+    assert!(pendulum.affine().is_some());
+}
