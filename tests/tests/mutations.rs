@@ -138,6 +138,10 @@ fn damaged_models_never_panic() {
                    [[effect]]\n[effect.input_delay]\nat = [\"input.left\"]\ndelay = 0.02\n\
                    [fit]\nfree = [\"wheel_radius\"]\n[simulation]\nmax_step_s = 0.001\n";
     texts.push(format!("{}{effects}", texts[0]));
+    for name in ["pendulum.toml", "twil.toml"] {
+        let path = repository().join("examples/expressions").join(name);
+        texts.push(std::fs::read_to_string(path).unwrap());
+    }
     for (seed, text) in texts.iter().enumerate() {
         let read = survivors(text, seed as u64, 300, use_model);
         println!("text {seed}: {read} of 300 still read");

@@ -464,7 +464,10 @@ fn parts_that_a_file_defines_keep_their_word() {
         let of = says_what_it_takes(meta);
         let text = match meta.role {
             "plant" => meta.example.to_owned(),
-            _ => format!("{}\n{}", plants()[1].example, meta.example),
+            _ => {
+                let robot = plants().into_iter().find(|p| p.id == "ddmr").unwrap();
+                format!("{}\n{}", robot.example, meta.example)
+            }
         };
         let (model, _) = Model::from_toml("example", &text).unwrap();
         assert!(model.missing_values().is_empty(), "{of}: the example");

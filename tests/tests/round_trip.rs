@@ -450,8 +450,17 @@ proptest! {
 /// Files as the examples have them, by what they print.
 #[test]
 fn models_of_the_registry() {
-    for meta in plants() {
-        let (first, second): (ModelFile, ModelFile) = twice(meta.example);
+    let examples = plants().into_iter().map(|meta| meta.example.to_owned());
+    let own = ["pendulum.toml", "robot.toml", "twil.toml"].map(|name| {
+        let path = loopsight_tests::repository().join("examples/expressions");
+        std::fs::read_to_string(path.join(name)).unwrap()
+    });
+    for text in examples.chain(own) {
+        let (first, second): (ModelFile, ModelFile) = twice(&text);
         assert_eq!(format!("{first:?}"), format!("{second:?}"));
+        // Written anew, it is the same model.
+        let written = toml::to_string(&first).unwrap();
+        let models = [&text, &written].map(|t| Model::from_toml("model.toml", t).unwrap().0);
+        assert_eq!(models[0].parameters, models[1].parameters);
     }
 }

@@ -315,7 +315,9 @@ macro_rules! dynamics {
                 match x.len() {
                     0..=2 => self.step_in::<$scalar, 2>(x, h, u, w, p),
                     3..=4 => self.step_in::<$scalar, 4>(x, h, u, w, p),
-                    5..=8 => self.step_in::<$scalar, 8>(x, h, u, w, p),
+                    5..=6 => self.step_in::<$scalar, 6>(x, h, u, w, p),
+                    7..=8 => self.step_in::<$scalar, 8>(x, h, u, w, p),
+                    9..=16 => self.step_in::<$scalar, 16>(x, h, u, w, p),
                     _ => self.step_in::<$scalar, MOST>(x, h, u, w, p),
                 }
             }

@@ -6,10 +6,8 @@ use crate::{Dual, Real};
 
 /// Bank of the program's own numbers.
 const NUMBERS: u8 = 0;
-/// Bank of intermediate results.
-const SAVED: u8 = 1;
 /// First of the banks a program is run with.
-pub(crate) const FIRST_BANK: u8 = 2;
+pub(crate) const FIRST_BANK: u8 = 1;
 /// Number of banks a program is run with.
 pub(crate) const N_BANKS: usize = 4;
 /// Room for intermediate results; a tree of `n` leaves needs at most `log2 n` of them, since the
@@ -22,38 +20,59 @@ pub(crate) const MOST_LEAVES: usize = 1 << 12;
 /// Largest whole exponent that is written as a product.
 const LARGEST_WHOLE: f64 = 16.0;
 
-/// One instruction. There is one accumulator; the other operand, where there is one, is a slot.
+/// One instruction. There is one accumulator; operands are slots, or a saved result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Code {
-    /// accumulator <- slot
+    /// accumulator <- a
     Load,
-    /// saved\[index\] <- accumulator
+    /// result\[b\] <- a
+    Copy,
+    /// saved\[a\] <- accumulator
     Save,
-    /// result\[index\] <- accumulator
+    /// result\[a\] <- accumulator
     Store,
     Add,
     Subtract,
-    /// slot - accumulator
+    /// a - accumulator
     SubtractFrom,
     Multiply,
     Divide,
-    /// slot / accumulator
+    /// a / accumulator
     DivideInto,
+    /// accumulator <- a b
+    Product,
+    /// accumulator + a b
+    AddProduct,
+    /// accumulator - a b
+    SubtractProduct,
+    /// a b - accumulator
+    SubtractFromProduct,
+    /// accumulator <- a + b
+    Sum,
+    /// accumulator + (a + b)
+    AddSum,
+    /// accumulator - (a + b)
+    SubtractSum,
+    /// accumulator and saved\[a\]
+    Saved(Binary),
+    /// saved\[a\] and accumulator
+    SavedFirst(Binary),
     Negate,
     Square,
     /// accumulator^index
     Whole,
     One(Unary),
-    /// accumulator and slot
+    /// accumulator and a
     Two(Binary),
-    /// slot and accumulator
+    /// a and accumulator
     Reversed(Binary),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Instruction {
     code: Code,
-    slot: Slot,
+    a: Slot,
+    b: Slot,
 }
 
 /// Numbers for one scalar.
@@ -93,16 +112,25 @@ impl Program {
     pub(crate) fn new<'t>(trees: impl IntoIterator<Item = &'t Tree>) -> Self {
         let mut program = Self::default();
         for (index, tree) in trees.into_iter().enumerate() {
-            program.emit(tree, 0);
-            program.push(Code::Store, slot(0, index));
+            let to = slot(NUMBERS, index);
+            if let Some(from) = program.leaf(tree) {
+                program.push_two(Code::Copy, from, to);
+            } else {
+                program.emit(tree, 0);
+                program.push(Code::Store, to);
+            }
         }
         program.singles = program.doubles.iter().map(|x| *x as f32).collect();
         program.duals = program.doubles.iter().map(|x| Dual::of(*x)).collect();
         program
     }
 
-    fn push(&mut self, code: Code, slot: Slot) {
-        self.code.push(Instruction { code, slot });
+    fn push(&mut self, code: Code, a: Slot) {
+        self.push_two(code, a, a);
+    }
+
+    fn push_two(&mut self, code: Code, a: Slot, b: Slot) {
+        self.code.push(Instruction { code, a, b });
     }
 
     /// Where a leaf is found.
@@ -119,6 +147,44 @@ impl Program {
             }
             _ => None,
         }
+    }
+
+    /// The operands of a product or a sum of leaves.
+    fn pair(&mut self, of: Binary, tree: &Tree) -> Option<(Slot, Slot)> {
+        match tree {
+            Tree::Two(operation, a, b) if *operation == of => Some((self.leaf(a)?, self.leaf(b)?)),
+            _ => None,
+        }
+    }
+
+    /// Code for a sum or a difference of which one side is a product or a sum of leaves, which
+    /// needs no place to be kept. The order of a sum is free.
+    fn emit_with_pair(&mut self, add: bool, a: &Tree, b: &Tree, saved: usize) -> bool {
+        let (rest, code, pair) = if let Some(pair) = self.pair(Binary::Multiply, b) {
+            let code = if add {
+                Code::AddProduct
+            } else {
+                Code::SubtractProduct
+            };
+            (a, code, pair)
+        } else if let Some(pair) = self.pair(Binary::Add, b) {
+            let code = if add { Code::AddSum } else { Code::SubtractSum };
+            (a, code, pair)
+        } else if let Some(pair) = self.pair(Binary::Multiply, a) {
+            let code = if add {
+                Code::AddProduct
+            } else {
+                Code::SubtractFromProduct
+            };
+            (b, code, pair)
+        } else if let (true, Some(pair)) = (add, self.pair(Binary::Add, a)) {
+            (b, Code::AddSum, pair)
+        } else {
+            return false;
+        };
+        self.emit(rest, saved);
+        self.push_two(code, pair.0, pair.1);
+        true
     }
 
     /// Code that leaves the value of `tree` in the accumulator; `saved` results are in use.
@@ -144,24 +210,30 @@ impl Program {
                 self.push(Code::Whole, slot(NUMBERS, whole(exponent).unwrap_or(0)));
             }
             Tree::Two(operation, a, b) => {
-                if let Some(b) = self.leaf(b) {
+                let sum = matches!(operation, Binary::Add | Binary::Subtract);
+                let add = *operation == Binary::Add;
+                if let Some((a, b)) = self.pair(Binary::Multiply, tree) {
+                    self.push_two(Code::Product, a, b);
+                } else if let Some((a, b)) = self.pair(Binary::Add, tree) {
+                    self.push_two(Code::Sum, a, b);
+                } else if let Some(b) = self.leaf(b) {
                     self.emit(a, saved);
                     self.push(forward(*operation), b);
                 } else if let Some(a) = self.leaf(a) {
                     self.emit(b, saved);
                     self.push(reversed(*operation), a);
-                } else {
+                } else if !(sum && self.emit_with_pair(add, a, b, saved)) {
                     let deeper_first = depth(a) >= depth(b);
                     let (first, second) = if deeper_first { (a, b) } else { (b, a) };
                     self.emit(first, saved);
-                    let kept = slot(SAVED, saved);
+                    let kept = slot(NUMBERS, saved);
                     self.push(Code::Save, kept);
                     self.saved = self.saved.max(saved + 1);
                     self.emit(second, saved + 1);
                     let code = if deeper_first {
-                        reversed(*operation)
+                        Code::SavedFirst(*operation)
                     } else {
-                        forward(*operation)
+                        Code::Saved(*operation)
                     };
                     self.push(code, kept);
                 }
@@ -203,45 +275,63 @@ impl Program {
         Self: Numbers<S>,
     {
         let numbers: &[S] = self.numbers();
-        let banks: [&[S]; 5] = [numbers, banks[0], banks[1], banks[2], banks[3]];
-        let mut a = S::zero();
-        for Instruction { code, slot } in &self.code {
-            let index = usize::from(slot.index);
-            // The operand of those that have one.
-            macro_rules! b {
-                () => {
-                    if slot.bank == SAVED {
-                        saved.get(index).copied().unwrap_or(S::zero())
-                    } else {
-                        let bank = banks[usize::from(slot.bank.saturating_sub(1)) % 5];
-                        bank.get(index).copied().unwrap_or(S::zero())
+        let zero = S::zero();
+        let mut x = zero;
+        for Instruction { code, a, b } in &self.code {
+            macro_rules! at {
+                ($slot:expr) => {
+                    *match $slot.bank {
+                        NUMBERS => numbers,
+                        // A power of two: found without a check.
+                        bank => banks[usize::from(bank.wrapping_sub(FIRST_BANK)) % N_BANKS],
                     }
+                    .get(usize::from($slot.index))
+                    .unwrap_or(&zero)
                 };
             }
+            let index = usize::from(a.index);
             match code {
-                Code::Load => a = b!(),
+                Code::Load => x = at!(a),
+                Code::Copy => {
+                    if let Some(to) = results.get_mut(usize::from(b.index)) {
+                        *to = at!(a);
+                    }
+                }
                 Code::Save => {
                     if let Some(to) = saved.get_mut(index) {
-                        *to = a;
+                        *to = x;
                     }
                 }
                 Code::Store => {
                     if let Some(to) = results.get_mut(index) {
-                        *to = a;
+                        *to = x;
                     }
                 }
-                Code::Add => a += b!(),
-                Code::Subtract => a -= b!(),
-                Code::SubtractFrom => a = b!() - a,
-                Code::Multiply => a *= b!(),
-                Code::Divide => a /= b!(),
-                Code::DivideInto => a = b!() / a,
-                Code::Negate => a = -a,
-                Code::Square => a = a * a,
-                Code::Whole => a = whole_power(a, index),
-                Code::One(operation) => a = operation.apply(a),
-                Code::Two(operation) => a = operation.apply(a, b!()),
-                Code::Reversed(operation) => a = operation.apply(b!(), a),
+                Code::Add => x += at!(a),
+                Code::Subtract => x -= at!(a),
+                Code::SubtractFrom => x = at!(a) - x,
+                Code::Multiply => x *= at!(a),
+                Code::Divide => x /= at!(a),
+                Code::DivideInto => x = at!(a) / x,
+                Code::Product => x = at!(a) * at!(b),
+                Code::AddProduct => x += at!(a) * at!(b),
+                Code::SubtractProduct => x -= at!(a) * at!(b),
+                Code::SubtractFromProduct => x = at!(a) * at!(b) - x,
+                Code::Sum => x = at!(a) + at!(b),
+                Code::AddSum => x += at!(a) + at!(b),
+                Code::SubtractSum => x -= at!(a) + at!(b),
+                Code::Saved(operation) => {
+                    x = operation.apply(x, *saved.get(index).unwrap_or(&zero));
+                }
+                Code::SavedFirst(operation) => {
+                    x = operation.apply(*saved.get(index).unwrap_or(&zero), x);
+                }
+                Code::Negate => x = -x,
+                Code::Square => x = x * x,
+                Code::Whole => x = whole_power(x, index),
+                Code::One(operation) => x = operation.apply(x),
+                Code::Two(operation) => x = operation.apply(x, at!(a)),
+                Code::Reversed(operation) => x = operation.apply(at!(a), x),
             }
         }
     }

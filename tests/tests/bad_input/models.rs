@@ -71,6 +71,20 @@ fn spoilt_models() {
             &["spoilt.toml:"],
         ),
         (
+            effect("[effect.expression]\non = [\"wheel.right\"]\nforce = \"0.1 * flwo\"\n"),
+            &["flwo", "spoilt.toml:", ":16", "did you mean `flow`?"],
+        ),
+        (
+            effect("[effect.expression]\nat = [\"wheel.right\"]\nforce = \"tanh(flow\"\n"),
+            &["never closed", "spoilt.toml:", ":14"],
+        ),
+        (
+            "[plant.expression.states]\nx = { unit = \"m\", rate = \"v - x\" }\n\
+             [plant.expression.inputs]\nu = { unit = \"m/s\" }\n"
+                .to_owned(),
+            &["unknown name `v`", "spoilt.toml:2:27", "x, u"],
+        ),
+        (
             effect("[effect.coulomb_friction]\nat = [\"wheel.right\"]\nlevel = -1.0\n"),
             &["level", "spoilt.toml:"],
         ),
