@@ -403,8 +403,10 @@ struct Example {
     estimator: Option<Box<dyn EstimatorPart>>,
     controller: Option<Box<dyn ControllerPart>>,
     driver: Option<Box<dyn DriverPart>>,
-    plant: Option<Box<dyn PlantPart>>,
-    effect: Option<Box<dyn EffectPart>>,
+    #[serde(rename = "plant")]
+    _plant: Option<Box<dyn PlantPart>>,
+    #[serde(rename = "effect")]
+    _effect: Option<Box<dyn EffectPart>>,
 }
 
 /// The keys that a part's table takes, as the parser itself lists them.
