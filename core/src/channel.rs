@@ -118,6 +118,7 @@ impl Role {
             Role::Armature => "armature",
             Role::Centrifugal => "centrifugal",
             Role::Shaft => "shaft",
+            Role::Stall => "stall",
         }
     }
 

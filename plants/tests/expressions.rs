@@ -54,10 +54,11 @@ angle = { unit = \"rad\", rate = \"speed\" }
 [plant.expression.inputs]
 voltage = { unit = \"V\" }
 [plant.expression.outputs]
-supply_load = { unit = \"V\", value = \"abs(armature)\" }
+supply_load = { unit = \"V^2\", value = \"voltage * armature\" }
+stall_load = { unit = \"V^2\", value = \"voltage^2\" }
 armature = { unit = \"V\", value = \"voltage + K_A / K_C * speed\" }
 [plant.expression.channels]
-shaft = { unit = \"V\", flow = \"speed\", position = \"angle\", drive = \"voltage\", load = \"supply_load\", armature = \"armature\", shaft = \"angle\" }
+shaft = { unit = \"V\", flow = \"speed\", position = \"angle\", drive = \"voltage\", load = \"supply_load\", stall = \"stall_load\", armature = \"armature\", shaft = \"angle\" }
 load = { unit = \"rad/s^2\", flow = \"speed\", position = \"angle\", shaft = \"angle\" }
 [plant.expression.parameters]
 K_A = { value = -4.0, unit = \"1/s\" }
@@ -544,7 +545,7 @@ fn mistakes_in_effects_are_shown_where_they_stand() {
     assert_eq!(shown(&texts), EFFECT_MISTAKES);
 }
 
-const EFFECT_MISTAKES: &str = r#"m:8:20: unknown name `spede`, expected one of c, s, flow, position, drive, load, armature, shaft, nominal, side, time, speed, angle, voltage, supply_load, pi, π
+const EFFECT_MISTAKES: &str = r#"m:8:20: unknown name `spede`, expected one of c, s, flow, position, drive, load, armature, shaft, stall, nominal, side, time, speed, angle, voltage, supply_load, stall_load, pi, π
     at `spede`
     did you mean `speed`?
 m:8:15: unknown function `tahn`, expected one of abs, sign, sqrt, exp, ln, sin, cos, tan, asin, acos, atan, sinh, cosh, tanh, min, max, atan2
@@ -554,7 +555,7 @@ m:8:21: `tanh` takes one argument
     at `,`
 m:8:19: the parenthesis that begins here is never closed
     at `(`
-m:8:20: the channel `shaft` offers no heading, it offers flow, position, drive, load, armature, shaft
+m:8:20: the channel `shaft` offers no heading, it offers flow, position, drive, load, stall, armature, shaft
     at `heading`
 m:8:9: there is no expression
     at ``
@@ -601,7 +602,7 @@ fn mistakes_in_plants_are_shown_where_they_stand() {
         ("K_A * speed", "K_a * speed"),
         ("K_C * (voltage + shaft)", "K_C * (voltage + saft)"),
         ("rate = \"speed\"", "value = \"speed\""),
-        ("abs(armature)", "abs(armature + shaft)"),
+        ("voltage * armature", "voltage * (armature + shaft)"),
         ("voltage + K_A / K_C * speed", "voltage + 2 * supply_load"),
         ("voltage + K_A / K_C * speed", "armature"),
         (" + load\"", "\""),
@@ -618,7 +619,7 @@ fn mistakes_in_plants_are_shown_where_they_stand() {
             "[plant.expression.states]",
             "[plant.expression]\ncontrolled = [\"speed\", \"angle\"]\n[plant.expression.states]",
         ),
-        ("voltage + shaft)", "voltage^2 + shaft)"),
+        ("(voltage + shaft)", "(voltage^2 + shaft)"),
         (
             "\nload = { unit",
             "\nother = { rate = \"speed\", input = \"voltage\" }\nload = { unit",
@@ -636,7 +637,7 @@ fn mistakes_in_plants_are_shown_where_they_stand() {
     .map(|(right, wrong)| {
         assert!(AXIS.contains(right), "{right}");
         let mut text = AXIS.replacen(right, wrong, 1);
-        if wrong.contains("^2") {
+        if wrong.contains("(voltage^2") {
             text = format!("[plant.expression]\ncontrolled = [\"speed\"]\n{text}");
         }
         text
@@ -645,28 +646,28 @@ fn mistakes_in_plants_are_shown_where_they_stand() {
     assert_eq!(shown(&texts), PLANT_MISTAKES);
 }
 
-const PLANT_MISTAKES: &str = r#"m:2:35: unknown name `K_a`, expected one of K_A, K_C, speed, angle, voltage, supply_load, armature, shaft, load, pi, π
+const PLANT_MISTAKES: &str = r#"m:2:35: unknown name `K_a`, expected one of K_A, K_C, speed, angle, voltage, supply_load, stall_load, armature, shaft, load, pi, π
     at `K_a`
     did you mean `K_A`?
-m:2:66: unknown name `saft`, expected one of K_A, K_C, speed, angle, voltage, supply_load, armature, shaft, load, pi, π
+m:2:66: unknown name `saft`, expected one of K_A, K_C, speed, angle, voltage, supply_load, stall_load, armature, shaft, load, pi, π
     at `saft`
     did you mean `shaft`?
 m:3:1: `angle` is a state and needs a `rate`: an expression
     at `angle`
-m:7:53: the effort `shaft` acts on rates, an output cannot read it
+m:7:62: the effort `shaft` acts on rates, an output cannot read it
     at `shaft`
-m:8:49: an output depends on itself: supply_load needs armature needs supply_load
+m:9:49: an output depends on itself: supply_load needs armature needs supply_load
     at `supply_load`
-m:8:35: an output depends on itself: armature needs armature
+m:9:35: an output depends on itself: armature needs armature
     at `armature`
-m:11:1: `load` is in no rate: an effort acts where its name stands
+m:12:1: `load` is in no rate: an effort acts where its name stands
     at `load`
-m:10:30: there is no signal `sped`, expected one of speed, angle, voltage, supply_load, armature
+m:11:30: there is no signal `sped`, expected one of speed, angle, voltage, supply_load, stall_load, armature
     at `"sped"`
     did you mean `speed`?
-m:10:1: the channel `shaft` needs a `unit`: that of what is added there
+m:11:1: the channel `shaft` needs a `unit`: that of what is added there
     at `shaft`
-m:13:1: `speed` is already the name of a state
+m:14:1: `speed` is already the name of a state
     at `speed`
 m:5:20: the unit `V/`: character 3: a unit is missing
     at `"V/"`
@@ -679,11 +680,11 @@ m:2:1: 2 controlled states, expected as many as inputs: 1
     at `controlled`
 m:2:15: the rate of `speed` is not affine in the inputs, so no velocity controller can act on it
     at `"speed"`
-m:11:11: a channel is at one place, found two
+m:12:11: a channel is at one place, found two
     at `rate`
-m:14:17: `K_C` is NaN rad/s^2/V, expected a finite number
+m:15:17: `K_C` is NaN rad/s^2/V, expected a finite number
     at `nan`
-m:13:1: `extra` is in no expression
+m:14:1: `extra` is in no expression
     at `extra`
 m:2:1: `a b` is no name for an expression, expected letters, digits and `_`
     at `"a b"`

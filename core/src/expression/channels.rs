@@ -42,6 +42,8 @@ pub(crate) struct ChannelTable {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     shaft: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    stall: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     side: Option<i8>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     size: Option<f64>,
@@ -62,6 +64,7 @@ impl ChannelTable {
             Role::Armature => &self.armature,
             Role::Centrifugal => &self.centrifugal,
             Role::Shaft => &self.shaft,
+            Role::Stall => &self.stall,
         }
         .as_deref()
     }
