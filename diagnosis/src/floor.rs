@@ -42,6 +42,7 @@ pub(crate) fn noise(sensor: &Sensor, signal: usize, runs: &[Run]) -> (f64, f64) 
     let mut rate = Tally::default();
     let mut period = f64::NAN;
     for run in runs {
+        let step = run.median_period();
         let mut news: Vec<(f64, f64)> = Vec::new();
         for k in 0..run.len() {
             let (time, y) = (run.time[k], run.sample(k)[signal]);
@@ -62,12 +63,12 @@ pub(crate) fn noise(sensor: &Sensor, signal: usize, runs: &[Run]) -> (f64, f64) 
         }
         for w in news.windows(2) {
             // Over the time it took, each sample once.
-            let samples = ((w[1].0 - w[0].0) / run.median_period()).round().max(1.0);
+            let samples = ((w[1].0 - w[0].0) / step).round().max(1.0);
             for _ in 0..(samples as usize).min(run.len()) {
                 rate.add((w[1].1 - w[0].1) / (w[1].0 - w[0].0), 0.0);
             }
         }
-        period = period.min(run.median_period());
+        period = period.min(step);
     }
     let noise = match sensor {
         Sensor::EncoderCounts(encoder) => encoder.noise(period),
