@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use loopsight_core::model::Model;
 use loopsight_core::registry::{
     BuildError, ControllerPart, DriverContext, DriverPart, EffectPart, EstimatorPart, PartMeta,
-    PlantPart, effects, parts, plants, written,
+    PlantPart, parts, plants, written,
 };
 use loopsight_core::run::Run;
 use loopsight_tests::{recording, twil};
