@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use loopsight_diagnosis::{Comparison, Fit, Held, ResidualForce, Statement, Verdict};
+use loopsight_diagnosis::{Comparison, Estimate, Fit, Held, ResidualForce, Statement, Verdict};
 use loopsight_recordings::{Fault, Severity};
 use serde::Serialize;
 
@@ -159,24 +159,22 @@ pub(crate) fn held(observer: Option<&Held>) -> String {
     observer.map_or_else(String::new, |held| format!("note: {}\n", held.statement))
 }
 
+fn estimate((name, p): (&String, &Estimate)) -> Vec<String> {
+    vec![
+        name.clone(),
+        number(p.value),
+        p.unit.clone(),
+        p.std_error
+            .map_or_else(|| "-".to_owned(), |e| format!("{e:.2e}")),
+        p.interval95.map_or_else(
+            || "-".to_owned(),
+            |[low, high]| format!("{} … {}", number(low), number(high)),
+        ),
+    ]
+}
+
 pub(crate) fn fit(fit: &Fit) -> String {
-    let rows: Vec<Vec<String>> = fit
-        .parameters
-        .iter()
-        .map(|(name, p)| {
-            vec![
-                name.clone(),
-                number(p.value),
-                p.unit.clone(),
-                p.std_error
-                    .map_or_else(|| "-".to_owned(), |e| format!("{e:.2e}")),
-                p.interval95.map_or_else(
-                    || "-".to_owned(),
-                    |[low, high]| format!("{} … {}", number(low), number(high)),
-                ),
-            ]
-        })
-        .collect();
+    let rows: Vec<Vec<String>> = fit.parameters.iter().map(estimate).collect();
     let mut text = table(
         &["parameter", "value", "unit", "std error", "95 % interval"],
         &rows,
@@ -197,6 +195,11 @@ pub(crate) fn fit(fit: &Fit) -> String {
     }
     for flat in &fit.flat {
         text.push_str(&format!("\nnot determined: {flat}"));
+    }
+    if !fit.derived.is_empty() {
+        let rows: Vec<Vec<String>> = fit.derived.iter().map(estimate).collect();
+        let head = ["from these", "value", "unit", "std error", "95 % interval"];
+        text.push_str(&format!("\n\n{}", table(&head, &rows)));
     }
     text.push_str(&format!(
         "\n\nerror on the fitted log: {}{}",

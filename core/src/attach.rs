@@ -232,7 +232,7 @@ pub fn misfit(channel: &Channel, effect: &EffectMeta) -> Option<String> {
         .find(|r| channel.read(**r).is_some())
     {
         return Some(format!(
-            "where there is a {} another effect says it more precisely",
+            "where there is a {} it is said more precisely without it",
             role.name()
         ));
     }

@@ -85,11 +85,15 @@ pub enum Role {
     Shaft,
     /// What [`Role::Load`] would be with the motors at rest: the sum of the squares of the commands.
     Stall,
+    /// Gravity that the plant itself has at this place.
+    Gravity,
+    /// Head of a liquid over its outlet: no solids rub on each other here.
+    Head,
 }
 
 impl Role {
     /// Number of roles.
-    pub const COUNT: usize = 11;
+    pub const COUNT: usize = 13;
     /// All of them, in order.
     pub const ALL: [Role; Role::COUNT] = [
         Role::Flow,
@@ -103,6 +107,8 @@ impl Role {
         Role::Centrifugal,
         Role::Shaft,
         Role::Stall,
+        Role::Gravity,
+        Role::Head,
     ];
 
     /// Name in files and expressions.
@@ -136,6 +142,8 @@ impl Role {
             Role::Centrifugal => "acceleration by turning",
             Role::Shaft => "shaft angle",
             Role::Stall => "supply load at rest",
+            Role::Gravity => "gravity of its own",
+            Role::Head => "head of a liquid",
         }
     }
 }

@@ -23,7 +23,8 @@ pub struct EffectMeta {
     pub places: &'static [PlaceKind],
     /// Roles it reads at its channel; a channel that does not offer them all is refused.
     pub reads: &'static [Role],
-    /// Channels that offer one of these are left to a more specific effect, and refused.
+    /// Channels that offer one of these are refused: they are left to a more specific effect or to
+    /// the plant itself.
     pub yields_to: &'static [Role],
     /// It acts oppositely on two sides; a channel without a [`crate::Channel::side`] is refused.
     pub sided: bool,

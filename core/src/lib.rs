@@ -16,6 +16,7 @@
 mod channel;
 mod clock;
 mod controller;
+mod derived;
 mod driver;
 #[cfg(feature = "std")]
 mod dual;
@@ -65,6 +66,7 @@ pub use channel::{Channel, Place, PlaceKind, Reads, Role};
 pub use clock::SystemClock;
 pub use clock::{Clock, SimulatedClock};
 pub use controller::{AffineModel, Command, ControlError, Controller};
+pub use derived::Derived;
 pub use driver::{Driver, DriverError, DriverFault, Sample};
 #[cfg(feature = "std")]
 pub use dual::{DUAL_WIDTH, Dual, derivative, variable};

@@ -10,9 +10,9 @@ use crate::attach::{attach, make_names_unique};
 pub use crate::attach::{misfit, unit_at};
 use crate::config::{ConfigError, ReadError, Source, Step, nearest, read_text};
 use crate::registry::{AnyDynamics, AnyPhysics, EffectPart, HostReal, PlantPart};
-use crate::run::LogMap;
+use crate::run::{ColumnMap, Hold, LogMap};
 use crate::sensor::Sensor;
-use crate::{Channel, EffectMeta, Parameter, Place, PlantMeta, Role, Signal};
+use crate::{Channel, Derived, EffectMeta, Parameter, Place, PlantMeta, Role, Signal};
 
 /// A model file, as written.
 #[derive(Debug, Serialize, Deserialize)]
@@ -385,6 +385,14 @@ impl Model {
         }
     }
 
+    /// How the `index`-th input runs between the samples of a log.
+    pub fn hold(&self, index: usize) -> Hold {
+        let input = self.plant.inputs.get(index);
+        input
+            .and_then(|i| self.log.inputs.get(i.id))
+            .map_or(Hold::ZeroOrder, ColumnMap::hold)
+    }
+
     /// Number of plant states.
     pub fn n_states(&self) -> usize {
         self.plant.states.len()
@@ -409,6 +417,14 @@ impl Model {
         let mut p = vec![S::zero(); self.plant.parameters.len()];
         S::dynamics(self.dynamics).lower(self.set, &values[..self.n_plant_parameters], &mut p);
         p
+    }
+
+    /// What follows from the plant's parameters at the model's values.
+    pub fn derived<S: HostReal>(&self, values: &[S]) -> Vec<(&'static Derived, S)> {
+        let p = self.lower(values);
+        let dynamics = S::dynamics(self.dynamics);
+        let of = |(index, meta)| (meta, dynamics.derived(index, &p));
+        dynamics.derivable().iter().enumerate().map(of).collect()
     }
 
     /// All signals (states, inputs, outputs) at a state and input, without effects.

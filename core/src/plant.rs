@@ -1,6 +1,6 @@
 //! Plants: the static view authors write, and the object-safe view made from it.
 
-use crate::{Channel, Parameter, Real, Signal};
+use crate::{Channel, Derived, Parameter, Real, Signal};
 
 /// What a plant says about itself.
 #[derive(Clone, Copy, Debug)]
@@ -59,6 +59,9 @@ pub trait Plant<const NX: usize, const NU: usize, const NW: usize, const NP: usi
     /// Names, units, channels, parameters, equation, reference.
     const META: PlantMeta;
 
+    /// Quantities that follow from the parameters.
+    const DERIVED: &'static [Derived] = &[];
+
     /// The rate of the state, in the state's units per second.
     fn derivative<S: Real>(x: &[S; NX], u: &[S; NU], w: &[S; NW], p: &[S; NP]) -> [S; NX];
 
@@ -71,6 +74,12 @@ pub trait Plant<const NX: usize, const NU: usize, const NW: usize, const NP: usi
     fn lower<S: Real>(set: usize, from: &[S]) -> Option<[S; NP]> {
         let _ = (set, from);
         None
+    }
+
+    /// The `index`-th of [`Plant::DERIVED`].
+    fn derived<S: Real>(index: usize, p: &[S; NP]) -> S {
+        let _ = (index, p);
+        S::zero()
     }
 }
 
@@ -100,6 +109,15 @@ pub trait Dynamics<S: Real>: Send + Sync {
     /// Parameters of the equations from the values the file gives (set 0 is the equations' own,
     /// set `i` is [`PlantMeta::parameterizations`]`[i - 1]`).
     fn lower(&self, set: usize, from: &[S], p: &mut [S]);
+    /// See [`Plant::DERIVED`].
+    fn derivable(&self) -> &'static [Derived] {
+        &[]
+    }
+    /// See [`Plant::derived`]; zero for parameters of another length.
+    fn derived(&self, index: usize, p: &[S]) -> S {
+        let _ = (index, p);
+        S::zero()
+    }
 }
 
 /// Checks the sizes of a plant against its declaration; called by [`declare_plant!`](crate::declare_plant) in a constant.
@@ -191,6 +209,15 @@ macro_rules! declare_plant {
                     }
                 }
             }
+            fn derivable(&self) -> &'static [$crate::Derived] {
+                <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::DERIVED
+            }
+            fn derived(&self, index: usize, p: &[S]) -> S {
+                let Ok(p) = p.try_into() else {
+                    return S::of(0.0);
+                };
+                <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::derived(index, p)
+            }
         }
 
         $crate::register_plant!($plant, $id, <$nx, $nu, $nw, $np, $ny>);
@@ -250,7 +277,8 @@ macro_rules! register_plant {
             }
 
             inventory::submit! { $crate::registry::PlantEntry(
-                <$plant as $crate::registry::DeclaredPlant>::META
+                <$plant as $crate::registry::DeclaredPlant>::META,
+                <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::DERIVED,
             ) }
         };
     };

@@ -13,7 +13,7 @@ pub use crate::configured::{ConfiguredEffect, ConfiguredPlant, Values, range_tex
 use crate::model::{Model, ModelError};
 use crate::run::Run;
 use crate::{
-    Channel, Controller, Driver, DriverError, DriverFault, Dual, Dynamics, EffectMeta, Estimator,
+    Channel, Controller, Derived, Driver, DriverError, DriverFault, Dual, Dynamics, EffectMeta, Estimator,
     Physics, PlantMeta, Real,
 };
 
@@ -295,7 +295,7 @@ pub trait DriverPart: Debug + Send + Sync {
 
 /// Registers a plant; made by [`declare_plant!`](crate::declare_plant).
 #[derive(Debug)]
-pub struct PlantEntry(pub &'static PlantMeta);
+pub struct PlantEntry(pub &'static PlantMeta, pub &'static [Derived]);
 /// Registers an effect; made by [`declare_effect!`](crate::declare_effect).
 pub struct EffectEntry(pub &'static EffectMeta, pub &'static dyn AnyPhysics);
 /// Registers an estimator, controller or driver; made by
@@ -334,6 +334,14 @@ pub fn plants() -> Vec<&'static PlantMeta> {
         .collect();
     all.sort_by_key(|m| m.id);
     all
+}
+
+/// What follows from the parameters of the linked plant `id`; nothing where there is none.
+pub fn derived(id: &str) -> &'static [Derived] {
+    inventory::iter::<PlantEntry>
+        .into_iter()
+        .find(|e| e.0.id == id)
+        .map_or(&[], |e| e.1)
 }
 
 /// All linked effects, by id.

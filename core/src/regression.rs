@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::Dynamics;
 use crate::model::{Model, pseudo_inverse};
 use crate::registry::HostReal;
+use crate::run::Hold;
 
 /// How a regression is made from samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -176,6 +177,11 @@ impl Regression {
         let zero = self.dx[state];
         self.rate(x, u, Some(j));
         self.dx[state] - zero
+    }
+
+    /// How the `index`-th input runs between samples: what [`Regression::push`] wants is its mean.
+    pub fn hold(&self, index: usize) -> Hold {
+        self.model.hold(index)
     }
 
     /// Number of scalar regressions.

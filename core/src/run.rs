@@ -11,7 +11,8 @@ use crate::simulate::StateObserver;
 /// One uninterrupted run: what was applied and what was measured, in SI units.
 ///
 /// Row `k` of `measured` was taken at `time[k]`; row `k` of `inputs` was applied from `time[k]` to
-/// `time[k + 1]` (zero-order hold).
+/// `time[k + 1]`, or, where the model's [`LogMap`] says first-order hold, on a straight line to row
+/// `k + 1`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Run {
     /// Name, e.g. `slow-forward`; empty when the log holds one run only.
@@ -119,7 +120,8 @@ pub enum ColumnMap {
     Full(Column),
 }
 
-/// A column with its conversion: SI value = (value in `unit` as SI) times `scale`.
+/// A column with its conversion: SI value = (value in `unit` as SI) times (`scale` in `scale_unit`
+/// as SI).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
@@ -128,9 +130,36 @@ pub struct Column {
     /// Unit when the name does not end with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// Dimensionless factor; `-1` reverses the sign.
+    /// Factor; `-1` reverses the sign.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub scale: f64,
+    /// Unit of `scale` where the column holds what a transducer makes of the signal: `m/V`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_unit: Option<String>,
+    /// How an input runs between its samples.
+    #[serde(default, skip_serializing_if = "Hold::is_zero_order")]
+    pub hold: Hold,
+}
+
+/// How an input runs between the samples of a log (A. V. Oppenheim, R. W. Schafer, 2010,
+/// "Discrete-Time Signal Processing", 3rd edition, section 4.2).
+///
+/// A command that a computer puts out is a staircase. An input that was *measured*, or a smooth
+/// reference, is not: to take it for one is to find half a sample of delay in a perfect model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hold {
+    /// Constant until the next sample.
+    #[default]
+    ZeroOrder,
+    /// A straight line to the next sample.
+    FirstOrder,
+}
+
+impl Hold {
+    fn is_zero_order(&self) -> bool {
+        *self == Hold::ZeroOrder
+    }
 }
 
 fn one() -> f64 {
@@ -162,11 +191,27 @@ impl ColumnMap {
         }
     }
 
-    /// Dimensionless factor.
+    /// Factor.
     pub fn scale(&self) -> f64 {
         match self {
             ColumnMap::Name(_) => 1.0,
             ColumnMap::Full(column) => column.scale,
+        }
+    }
+
+    /// Unit of the factor.
+    pub fn scale_unit(&self) -> Option<&str> {
+        match self {
+            ColumnMap::Name(_) => None,
+            ColumnMap::Full(column) => column.scale_unit.as_deref(),
+        }
+    }
+
+    /// How an input runs between its samples.
+    pub fn hold(&self) -> Hold {
+        match self {
+            ColumnMap::Name(_) => Hold::ZeroOrder,
+            ColumnMap::Full(column) => column.hold,
         }
     }
 }
@@ -181,9 +226,12 @@ pub struct Measured {
     /// Unit when the name does not end with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// Dimensionless factor; `-1` reverses the sign.
+    /// Factor; `-1` reverses the sign.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
+    /// Unit of `scale` where the column holds what a transducer makes of the signal: `m/V`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_unit: Option<String>,
     /// How the number is made.
     #[serde(default)]
     pub sensor: Sensor,

@@ -16,6 +16,8 @@ pub struct Signal {
     pub doc: &'static str,
     /// Size of a value that matters, in its unit, see [`crate::Channel::size`].
     pub size: f64,
+    /// An input that a machine may be without: zero where a log has no column for it.
+    pub optional: bool,
 }
 
 impl Signal {
@@ -32,7 +34,14 @@ impl Signal {
             unit,
             doc,
             size: 1.0,
+            optional: false,
         }
+    }
+
+    /// An input that is zero where a log has no column for it.
+    pub const fn optional(mut self) -> Self {
+        self.optional = true;
+        self
     }
 
     /// Size of a value that matters; 1 unless said otherwise.

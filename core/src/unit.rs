@@ -120,7 +120,7 @@ impl Unit {
     };
 
     /// `self · other^power`; nothing when it leaves the range of exponents or numbers.
-    fn times(self, other: Self, power: i8) -> Option<Self> {
+    pub fn times(self, other: Self, power: i8) -> Option<Self> {
         let mut factor = 1.0;
         for _ in 0..power.unsigned_abs() {
             factor *= other.factor;

@@ -96,6 +96,9 @@ pub struct Fit {
     pub comparison: Comparison,
     /// The parameters by name.
     pub parameters: BTreeMap<String, Estimate>,
+    /// What follows from the plant's parameters, by name: see [`loopsight_core::Derived`].
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived: BTreeMap<String, Estimate>,
     /// How they were found.
     pub method: Method,
     /// Free-run error before the fit; absent where the file gave no values.

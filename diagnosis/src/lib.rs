@@ -6,6 +6,7 @@ mod candidates;
 mod choose;
 mod compare;
 mod conclusion;
+mod derived;
 mod diagnose;
 mod experiment;
 pub mod fit;

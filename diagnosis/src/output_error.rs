@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::compare::Comparison;
+use crate::derived::{Known, derived};
 use crate::fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
 use crate::flatness::Flatness;
 use crate::noise;
@@ -214,9 +215,21 @@ impl Problem<'_> {
             }
             parameters.insert(parameter.name.clone(), estimate);
         }
+        let n = self.free.len();
+        let known = Known {
+            free: &self.free,
+            covariance: DMatrix::from_fn(n, n, |i, j| {
+                covariance[(i, j)] * self.scales[i] * self.scales[j]
+            }),
+            undetermined: (0..n)
+                .map(|k| flatness.dead[k] || flatness.flat[k])
+                .collect(),
+            quantile,
+        };
         Fit {
             comparison: Comparison::empty(),
             parameters,
+            derived: derived(&fitted, Some(&known)),
             method: Method::OutputError,
             nrmse_before: None,
             nrmse_fit: f64::NAN,

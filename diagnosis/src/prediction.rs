@@ -263,12 +263,12 @@ pub(crate) fn one_step(
         for (x, c) in next.state_mut().iter_mut().zip(correction.iter()) {
             *x += c;
         }
-        next.advance(run.time[k], run.input(k - 1));
+        next.advance_between(run.time[k], run.input(k - 1), run.input(k));
         next.measure(&mut outputs);
         each(k, &outputs);
         if let Some(observer) = run.observer.as_deref() {
             free.correct(observer, k - 1, run.sample(k - 1), &before);
         }
-        free.advance(run.time[k], run.input(k - 1));
+        free.advance_between(run.time[k], run.input(k - 1), run.input(k));
     }
 }

@@ -3,7 +3,7 @@
 use loopsight_core::model::{Model, pseudo_inverse};
 use loopsight_core::regression::RegressionError;
 pub use loopsight_core::regression::{Regression, Scheme};
-use loopsight_core::run::Run;
+use loopsight_core::run::{Hold, Run};
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::FitError;
@@ -42,8 +42,13 @@ pub(crate) fn for_each_row(
             let elapsed = run.time[k] - run.time[last];
             for i in last..k {
                 let share = (run.time[i + 1] - run.time[i]) / elapsed;
-                for (mean, value) in input.iter_mut().zip(run.input(i)) {
-                    *mean += share * value;
+                let ends = run.input(i).iter().zip(run.input(i + 1));
+                for (index, (mean, (value, next))) in input.iter_mut().zip(ends).enumerate() {
+                    *mean += share
+                        * match regression.hold(index) {
+                            Hold::ZeroOrder => *value,
+                            Hold::FirstOrder => 0.5 * (value + next),
+                        };
                 }
             }
             last = k;

@@ -9,6 +9,7 @@ use loopsight_core::run::Run;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::compare::Comparison;
+use crate::derived::derived;
 use crate::fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
 use crate::regression::{Regression, for_each_row};
 
@@ -123,6 +124,7 @@ pub(crate) fn fit(
     Ok(Fit {
         comparison: Comparison::empty(),
         parameters,
+        derived: derived(&fitted, None),
         method: Method::Rls,
         nrmse_before: None,
         nrmse_fit: f64::NAN,

@@ -43,6 +43,9 @@ pub(crate) fn reasons(model: &Model, runs: &[Run]) -> Vec<Advice> {
         );
     }
     for (i, input) in model.plant.inputs.iter().enumerate() {
+        if input.optional {
+            continue;
+        }
         let values = || {
             runs.iter()
                 .flat_map(|r| (0..r.len()).map(move |k| r.input(k)[i]))

@@ -1,14 +1,16 @@
 //! One motor, one axis.
 
 use loopsight_core::{
-    Channel, ControlAffine, Parameter, Parameterization, Place, Plant, PlantMeta, Reads, Real,
-    Role, Signal, declare_plant,
+    Channel, ControlAffine, Derived, Parameter, Parameterization, Place, Plant, PlantMeta, Reads,
+    Real, Role, Signal, declare_plant,
 };
 
-/// An axis driven by one DC motor: a wheel, a flywheel, a joint without gravity.
+use crate::motor;
+
+/// An axis driven by one DC motor: a wheel, a flywheel, a lift, a slide on a screw or belt.
 ///
 /// ```text
-/// ω' = K_A ω + K_C (V + w) + w_a        φ' = ω
+/// ω' = K_A ω + K_C (V + w) + w_a        φ' = ω        s = r φ        v = r ω
 /// ```
 ///
 /// | symbol | what | unit |
@@ -17,95 +19,54 @@ use loopsight_core::{
 /// | `V` | motor voltage | V |
 /// | `w` | effort at the shaft, as the motor voltage that would have the same effect | V |
 /// | `w_a` | acceleration added to the shaft | rad/s² |
+/// | `r` | travel per angle of the shaft | m/rad |
+/// | `s`, `v` | travel and its speed, of a linear axis | m, m/s |
 ///
-/// From physical parameters, with inertia `I` at the shaft and the motor behind a gear `n` (shaft
-/// speed over motor speed), the inductance neglected as in (22) of the paper:
+/// The axis is linear where travel is measured or the mass on it is given; then `r` must be known.
+/// From physical parameters, with inertia `I` at the shaft, a mass `m` moved by the radius `r` and
+/// the motor behind a gear `n` (shaft speed over motor speed), the inductance neglected as in (22)
+/// of the paper:
 ///
 /// ```text
-/// D = I n² + J      K_A = -(K_T K_a/R_a + f)/D      K_C = n K_T/(R_a D)
+/// D = (I + m r²) n² + J      K_A = -(K_T K_a/R_a + f)/D      K_C = n K_T/(R_a D)
 /// ```
 ///
+/// In the words of WPILib's SysId, `V = kS sgn(ω) + kV ω + kA ω' + kG`: `kV = -K_A/K_C` and
+/// `kA = 1/K_C` follow from the plant alone and are shown with a fit; `kS` is the level of a
+/// `coulomb_friction` and `-kG` the force of a `constant_force` at the shaft, both in volts.
+///
 /// Reference: the motor is that of Alves, Lages, Henriques (2018), equations (11)–(16), (22), with
-/// an inertia as the load.
+/// an inertia as the load; WPILib documentation, "Introduction to DC Motor Feedforward".
 #[derive(Clone, Copy, Debug)]
 pub struct DcAxis;
 
-const LUMPED: [Parameter; 2] = [
-    Parameter::new(
-        "K_A",
-        "K_A",
-        "1/s",
-        "damping: back-emf and viscous friction over inertia",
-    )
-    .within(f64::NEG_INFINITY, 0.0),
-    Parameter::new("K_C", "K_C", "rad/s^2/V", "acceleration per volt"),
-];
+const LUMPED: [Parameter; 3] = [motor::DAMPING, motor::DRIVE, RADIUS];
 
-const PHYSICAL: [Parameter; 7] = [
-    Parameter::new("inertia", "I", "kg m^2", "moment of inertia at the shaft")
-        .above(0.0)
-        .nonlinear()
-        .scaled(0.01),
-    Parameter::new(
-        "torque_constant",
-        "K_T",
-        "N m/A",
-        "torque constant of the motor",
-    )
-    .above(0.0)
-    .known()
-    .nonlinear()
-    .scaled(0.01),
-    Parameter::new(
-        "back_emf_constant",
-        "K_a",
-        "V s/rad",
-        "back-emf constant of the motor",
-    )
-    .above(0.0)
-    .known()
-    .nonlinear()
-    .scaled(0.01),
-    Parameter::new(
-        "resistance",
-        "R_a",
-        "Ohm",
-        "armature resistance of the motor",
-    )
-    .above(0.0)
-    .known()
-    .nonlinear(),
-    Parameter::new(
-        "gear_ratio",
-        "n",
-        "1",
-        "shaft speed over motor speed, below 1 for a reduction gear",
-    )
-    .above(0.0)
-    .known()
-    .nonlinear()
-    .or(1.0),
-    Parameter::new(
-        "rotor_inertia",
-        "J",
-        "kg m^2",
-        "moment of inertia of the rotor",
-    )
-    .within(0.0, f64::INFINITY)
-    .or(0.0)
-    .known()
-    .nonlinear()
-    .scaled(1e-5),
-    Parameter::new(
-        "viscous_friction",
-        "f",
-        "N m s/rad",
-        "viscous friction at the rotor",
-    )
-    .within(0.0, f64::INFINITY)
-    .or(0.0)
-    .nonlinear()
-    .scaled(1e-5),
+const RADIUS: Parameter = Parameter::new(
+    "radius",
+    "r",
+    "m/rad",
+    "travel per angle of the shaft: radius of a wheel, drum or pinion, lead of a screw",
+)
+.above(0.0)
+.or(1.0)
+.known()
+.nonlinear();
+
+const PHYSICAL: [Parameter; 9] = [
+    motor::INERTIA,
+    Parameter::new("mass", "m", "kg", "mass that is moved by the radius")
+        .within(0.0, f64::INFINITY)
+        .or(0.0)
+        .known()
+        .nonlinear(),
+    RADIUS,
+    motor::TORQUE_CONSTANT,
+    motor::BACK_EMF_CONSTANT,
+    motor::RESISTANCE,
+    motor::GEAR_RATIO,
+    motor::ROTOR_INERTIA,
+    motor::VISCOUS_FRICTION,
 ];
 
 const MOTOR: [Reads; 7] = [
@@ -117,6 +78,16 @@ const MOTOR: [Reads; 7] = [
     Reads(Role::Armature, "armature"),
     Reads(Role::Shaft, "angle"),
 ];
+/// The position that is measured is the travel.
+const TRAVEL: [Reads; 7] = [
+    Reads(Role::Flow, "linear_speed"),
+    Reads(Role::Position, "travel"),
+    MOTOR[2],
+    MOTOR[3],
+    MOTOR[4],
+    MOTOR[5],
+    MOTOR[6],
+];
 /// Where efforts are accelerations, volts over the winding say nothing.
 const LOAD: [Reads; 3] = [
     Reads(Role::Flow, "speed"),
@@ -124,7 +95,7 @@ const LOAD: [Reads; 3] = [
     Reads(Role::Shaft, "angle"),
 ];
 
-const CHANNELS: [Channel; 6] = [
+const CHANNELS: [Channel; 8] = [
     Channel {
         id: "shaft",
         place: Place::Effort(0),
@@ -185,14 +156,34 @@ const CHANNELS: [Channel; 6] = [
         size: 1.0,
         doc: "measurement of the angle",
     },
+    Channel {
+        id: "sensor.linear_speed",
+        place: Place::Output(6),
+        unit: "m/s",
+        equation: "v_measured = v + w",
+        reads: &TRAVEL,
+        side: 0,
+        size: 1.0,
+        doc: "measurement of the speed of a linear axis",
+    },
+    Channel {
+        id: "sensor.travel",
+        place: Place::Output(7),
+        unit: "m",
+        equation: "s_measured = s + w",
+        reads: &TRAVEL,
+        side: 0,
+        size: 1.0,
+        doc: "measurement of the travel",
+    },
 ];
 
-impl Plant<2, 1, 2, 2, 3> for DcAxis {
+impl Plant<2, 1, 2, 3, 5> for DcAxis {
     const META: PlantMeta = PlantMeta {
         id: "dc_axis",
-        summary: "an axis driven by one DC motor",
-        equation: "ω' = K_A ω + K_C V;  φ' = ω",
-        reference: "Alves, Lages, Henriques (2018), IFAC PapersOnLine 51-15, equations (11)-(16), (22), with an inertia as the load",
+        summary: "an axis driven by one DC motor, rotary or linear",
+        equation: "ω' = K_A ω + K_C V;  φ' = ω;  s = r φ;  v = r ω",
+        reference: "Alves, Lages, Henriques (2018), IFAC PapersOnLine 51-15, equations (11)-(16), (22), with an inertia as the load; kV, kA: WPILib documentation, Introduction to DC Motor Feedforward",
         assumptions: "rigid shaft, armature inductance neglected",
         example: "[plant.dc_axis]\nK_A = -2.0\nK_C = 8.0\n",
         states: &[
@@ -219,70 +210,97 @@ impl Plant<2, 1, 2, 2, 3> for DcAxis {
                 "V",
                 "voltage over the motor's winding, V less what K_A takes at this speed",
             ),
+            Signal::new("linear_speed", "v", "m/s", "speed of a linear axis"),
+            Signal::new("travel", "s", "m", "travel of a linear axis"),
         ],
-        integrals: &[("speed", "angle")],
+        integrals: &[("speed", "angle"), ("linear_speed", "travel")],
         channels: &CHANNELS,
         parameters: &LUMPED,
         parameterizations: &[Parameterization {
             id: "physical",
-            summary: "inertia and motor constants, from which K_A and K_C follow",
+            summary: "inertia, mass and motor constants, from which K_A and K_C follow",
             parameters: &PHYSICAL,
         }],
         controlled: &[0],
     };
 
-    fn derivative<S: Real>(x: &[S; 2], u: &[S; 1], w: &[S; 2], p: &[S; 2]) -> [S; 2] {
+    const DERIVED: &'static [Derived] = &motor::FEEDFORWARD;
+
+    fn derivative<S: Real>(x: &[S; 2], u: &[S; 1], w: &[S; 2], p: &[S; 3]) -> [S; 2] {
         [p[0] * x[0] + p[1] * (u[0] + w[0]) + w[1], x[0]]
     }
 
-    fn output<S: Real>(index: usize, x: &[S; 2], u: &[S; 1], p: &[S; 2]) -> S {
-        let [k_a, k_c] = *p;
-        // A motor without drive has no back-emf to speak of.
-        let armature = if k_c.abs() > S::of(1e-9) {
-            u[0] + k_a / k_c * x[0]
-        } else {
-            u[0]
-        };
+    fn output<S: Real>(index: usize, x: &[S; 2], u: &[S; 1], p: &[S; 3]) -> S {
+        let [k_a, k_c, radius] = *p;
         match index {
-            0 => u[0] * armature,
+            0 => u[0] * motor::armature(u[0], x[0], k_a, k_c),
             1 => u[0] * u[0],
-            _ => armature,
+            2 => motor::armature(u[0], x[0], k_a, k_c),
+            3 => radius * x[0],
+            _ => radius * x[1],
         }
     }
 
-    fn lower<S: Real>(set: usize, from: &[S]) -> Option<[S; 2]> {
+    fn lower<S: Real>(set: usize, from: &[S]) -> Option<[S; 3]> {
         if set != 0 {
             return None;
         }
-        let [inertia, k_t, k_a, r_a, n, j, f] = *<&[S; 7]>::try_from(from).ok()?;
-        let d = inertia * n * n + j;
-        Some([-(k_t * k_a / r_a + f) / d, n * k_t / (r_a * d)])
+        let [inertia, mass, radius, motor @ ..] = *<&[S; 9]>::try_from(from).ok()?;
+        let ([k_a, k_c], _) = motor::lumped(inertia + mass * radius * radius, &motor);
+        Some([k_a, k_c, radius])
+    }
+
+    fn derived<S: Real>(index: usize, p: &[S; 3]) -> S {
+        match index {
+            0 => motor::per_drive(-p[0], p[1]),
+            _ => motor::per_drive(S::one(), p[1]),
+        }
     }
 }
 
-impl ControlAffine<1, 1, 2> for DcAxis {
-    fn drift<S: Real>(y: &[S; 1], p: &[S; 2]) -> [S; 1] {
+impl ControlAffine<1, 1, 3> for DcAxis {
+    fn drift<S: Real>(y: &[S; 1], p: &[S; 3]) -> [S; 1] {
         [p[0] * y[0]]
     }
-    fn input_matrix<S: Real>(_y: &[S; 1], p: &[S; 2]) -> [[S; 1]; 1] {
+    fn input_matrix<S: Real>(_y: &[S; 1], p: &[S; 3]) -> [[S; 1]; 1] {
         [[p[1]]]
     }
 }
 
-declare_plant!(DcAxis, "dc_axis", <2, 1, 2, 2, 3>);
+declare_plant!(DcAxis, "dc_axis", <2, 1, 2, 3, 5>);
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// A lift on a drum: the mass counts as `m r²` at the shaft.
     #[test]
     fn physical_parameters_give_the_motor_equation() {
-        let (inertia, k_t, k_a, r_a, n, j, f) = (0.02, 0.03, 0.031, 1.5, 0.1, 3e-6, 1e-5);
-        let [ka, kc] = DcAxis::lower(0, &[inertia, k_t, k_a, r_a, n, j, f]).unwrap();
+        let (inertia, mass, radius) = (0.02, 4.0, 0.05);
+        let (k_t, k_a, r_a, n, j, f) = (0.03, 0.031, 1.5, 0.1, 3e-6, 1e-5);
+        let from = [inertia, mass, radius, k_t, k_a, r_a, n, j, f];
+        let p: [f64; 3] = DcAxis::lower(0, &from).unwrap();
         let (speed, volt) = (12.0, 7.0);
-        // Torque balance at the shaft: I ω' = (K_T i - J ω'/n - f ω/n)/n.
+        // Torque balance at the shaft: (I + m r²) ω' = (K_T i - J ω'/n - f ω/n)/n.
         let current = (volt - k_a * speed / n) / r_a;
-        let rate = (k_t * current - f * speed / n) / n / (inertia + j / (n * n));
-        assert!((ka * speed + kc * volt - rate).abs() < 1e-10 * rate.abs());
+        let torque = (k_t * current - f * speed / n) / n;
+        let rate = torque / (inertia + mass * radius * radius + j / (n * n));
+        let found = DcAxis::derivative(&[speed, 0.0], &[volt], &[0.0; 2], &p)[0];
+        assert!((found - rate).abs() < 1e-10 * rate.abs());
+        let [load, stall, armature, v, s] =
+            [0, 1, 2, 3, 4].map(|i| DcAxis::output(i, &[speed, 2.0], &[volt], &p));
+        assert!((armature - p[1].recip() * rate).abs() < 1e-9);
+        assert_eq!([load, stall], [volt * armature, volt * volt]);
+        assert_eq!([v, s], [radius * speed, radius * 2.0]);
+    }
+
+    /// SysId's form: the voltage of a speed and an acceleration is `kV ω + kA ω'`.
+    #[test]
+    fn feedforward_gains_invert_the_plant() {
+        let p = [-2.0, 8.0, 1.0];
+        let (speed, volt) = (3.0, 5.0);
+        let rate = DcAxis::derivative(&[speed, 0.0], &[volt], &[0.0; 2], &p)[0];
+        let (k_v, k_a): (f64, f64) = (DcAxis::derived(0, &p), DcAxis::derived(1, &p));
+        assert!((k_v * speed + k_a * rate - volt).abs() < 1e-12);
     }
 }

@@ -5,11 +5,20 @@
 
 #![cfg_attr(not(feature = "std"), no_std)]
 
+mod arm;
 mod cart_pole;
 mod dc_axis;
 mod ddmr;
 pub mod effects;
+mod motor;
+mod oscillator;
+mod servo_axis;
+mod tank_pair;
 
+pub use arm::Arm;
 pub use cart_pole::CartPole;
 pub use dc_axis::DcAxis;
 pub use ddmr::Ddmr;
+pub use oscillator::Oscillator;
+pub use servo_axis::ServoAxis;
+pub use tank_pair::TankPair;

@@ -269,6 +269,10 @@ impl<'a> Mapper<'a> {
     ) -> Result<(), RecordingError> {
         let plan = self.plan;
         for (link, _) in &plan.inputs {
+            let Some(link) = link else {
+                out.inputs.push(0.0);
+                continue;
+            };
             let value = row[link.column];
             self.check(run, at, *link, value, "an input")?;
             self.limit(run, at, *link, value * link.factor)?;

@@ -21,7 +21,8 @@ pub(crate) struct Link {
 pub(crate) struct Plan {
     pub(crate) time: Link,
     pub(crate) run: Option<usize>,
-    pub(crate) inputs: Vec<(Link, String)>,
+    /// Inputs with their columns; none for one that is optional and not logged.
+    pub(crate) inputs: Vec<(Option<Link>, String)>,
     pub(crate) measured: Vec<(Link, MeasuredSignal)>,
     pub(crate) notes: Vec<Fault>,
 }
@@ -32,6 +33,7 @@ struct Wish<'m> {
     column: Option<&'m str>,
     unit: Option<&'m str>,
     scale: Option<f64>,
+    scale_unit: Option<&'m str>,
 }
 
 impl Plan {
@@ -63,8 +65,13 @@ impl Plan {
                     column: Some(c.name()),
                     unit: c.unit(),
                     scale: Some(c.scale()),
+                    scale_unit: c.scale_unit(),
                 });
-            let link = finder.signal("the input", signal, wish)?;
+            let absent = signal.optional && find(table, wish.column.unwrap_or(signal.id)).is_none();
+            let link = match absent {
+                true => None,
+                false => Some(finder.signal("the input", signal, wish)?),
+            };
             input_links.push((link, signal.id.to_owned()));
         }
         let mut measured = Vec::new();
@@ -86,6 +93,7 @@ impl Plan {
                 column: m.column.as_deref(),
                 unit: m.unit.as_deref(),
                 scale: m.scale,
+                scale_unit: m.scale_unit.as_deref(),
             });
             let link = finder.signal("the measured signal", signal, wish)?;
             let measured_signal = MeasuredSignal {
@@ -190,7 +198,7 @@ impl Finder<'_> {
             signal.id,
             signal.unit,
             unit,
-            wish.scale.unwrap_or(1.0),
+            (wish.scale.unwrap_or(1.0), wish.scale_unit),
         )
     }
 
@@ -209,7 +217,7 @@ impl Finder<'_> {
                 "time",
                 "s",
                 time.unit().or(ending).or(split),
-                time.scale(),
+                (time.scale(), time.scale_unit()),
             );
         }
         let columns = &self.table.columns;
@@ -227,7 +235,7 @@ impl Finder<'_> {
             })
             .ok_or_else(|| self.missing("the time", "time", wanted, "time_s"))?;
         let unit = columns.get(column).and_then(|c| c.unit.as_deref());
-        self.link(column, "time", "s", unit, 1.0)
+        self.link(column, "time", "s", unit, (1.0, None))
     }
 
     fn link(
@@ -236,7 +244,7 @@ impl Finder<'_> {
         id: &str,
         si: &str,
         unit: Option<&str>,
-        scale: f64,
+        (scale, scale_unit): (f64, Option<&str>),
     ) -> Result<Link, RecordingError> {
         let header = self
             .table
@@ -259,9 +267,16 @@ impl Finder<'_> {
             });
         }
         let expected = self.unit(id, si)?;
-        let factor = match unit {
+        // What a transducer has a gain for is a plain number where the column does not say more.
+        let given = unit.or(scale_unit.map(|_| "1"));
+        let factor = match given {
             Some(text) => {
-                let found = self.unit(&header, text)?;
+                let mut found = self.unit(&header, text)?;
+                let mut text = text.to_owned();
+                if let Some(gain) = scale_unit {
+                    found = found.times(self.unit(&header, gain)?, 1).unwrap_or(found);
+                    text = format!("{text} times {gain}");
+                }
                 conversion(&found, &expected).ok_or_else(|| RecordingError::UnitMismatch {
                     log: self.table.source.as_str().into(),
                     column: header.as_str().into(),

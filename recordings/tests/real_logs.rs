@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use loopsight_core::Signal;
-use loopsight_core::run::{Column, ColumnMap, LogMap, Measured};
+use loopsight_core::run::{Column, ColumnMap, Hold, LogMap, Measured};
 use loopsight_recordings::{FaultKind, Recording, Severity, Source, map, read};
 
 const DRIVE_INPUTS: [Signal; 2] = [
@@ -73,6 +73,8 @@ fn named(name: &str, unit: Option<&str>) -> ColumnMap {
         column: name.into(),
         unit: unit.map(str::to_owned),
         scale: 1.0,
+        scale_unit: None,
+        hold: Hold::ZeroOrder,
     })
 }
 

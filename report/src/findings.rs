@@ -126,6 +126,7 @@ pub(crate) fn improvement(last: Conclusion) -> Improvement {
     let best = diagnosis(last).model.is_some().then(|| Fit {
         comparison: comparison(vec![]),
         parameters: crate::fit::tests::parameters(),
+        derived: std::collections::BTreeMap::new(),
         method: Method::OutputError,
         nrmse_before: None,
         nrmse_fit: 0.02,

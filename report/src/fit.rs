@@ -18,6 +18,7 @@ pub fn fit_page(context: &Context, fit: &Fit) -> String {
     Found {
         comparison: &fit.comparison,
         parameters: &fit.parameters,
+        derived: &fit.derived,
         method: fit.method,
         nrmse_before: fit.nrmse_before,
         nrmse_fit: fit.nrmse_fit,
@@ -32,6 +33,7 @@ pub fn fit_page(context: &Context, fit: &Fit) -> String {
 struct Found<'a> {
     comparison: &'a Comparison,
     parameters: &'a BTreeMap<String, Estimate>,
+    derived: &'a BTreeMap<String, Estimate>,
     method: Method,
     nrmse_before: Option<f64>,
     nrmse_fit: f64,
@@ -149,6 +151,13 @@ impl Found<'_> {
                 &rows,
             );
             out.push_str(&format!("<h3>Held at the file's value</h3>{table}"));
+        }
+        if !self.derived.is_empty() {
+            let table = estimates(&self.derived.iter().collect::<Vec<_>>());
+            out.push_str(&format!(
+                "<h3>What follows from them</h3><p class=\"what\"><code>loopsight explain</code> of the \
+                 plant says how.</p>{table}"
+            ));
         }
         out
     }
@@ -278,6 +287,17 @@ pub(crate) mod tests {
         Found {
             comparison: &comparison(friction_runs(1, n)),
             parameters: &parameters(),
+            derived: &[(
+                "kV".to_owned(),
+                Estimate {
+                    value: 1.2,
+                    unit: "V s/rad".into(),
+                    std_error: Some(0.01),
+                    interval95: Some([1.18, 1.22]),
+                    verdict: Verdict::Good,
+                },
+            )]
+            .into(),
             method: if history.is_empty() {
                 Method::OutputError
             } else {
@@ -302,6 +322,7 @@ pub(crate) mod tests {
             "−15.46 … −14.84",
             "interval wider than the value",
             "K_E: no relative interval to draw; no influence on what is measured here.",
+            "What follows from them",
             "Held at the file&#39;s value"
                 .replace("&#39;", "'")
                 .as_str(),

@@ -17,7 +17,7 @@ use loopsight_core::loop_file::LoopFile;
 use loopsight_core::model::{FitOptions, Model, ModelFile, SimulationOptions, misfit};
 use loopsight_core::registry::{ControllerPart, DriverPart, EstimatorPart, effects, parts, plants};
 use loopsight_core::regression::Scheme;
-use loopsight_core::run::{Column, ColumnMap, LogMap, Measured};
+use loopsight_core::run::{Column, ColumnMap, Hold, LogMap, Measured};
 use loopsight_core::sensor::{Encoder, Sensor};
 use loopsight_drivers::{Limit, Replay, Simulated};
 use loopsight_estimators::RlsSettings;
@@ -271,23 +271,34 @@ fn sensor() -> impl Strategy<Value = Sensor> {
 fn column() -> impl Strategy<Value = ColumnMap> {
     prop_oneof![
         name().prop_map(ColumnMap::Name),
-        (name(), option::of(name()), finite()).prop_map(|(column, unit, scale)| {
-            ColumnMap::Full(Column {
-                column,
-                unit,
-                scale,
-            })
-        }),
+        (
+            name(),
+            option::of(name()),
+            finite(),
+            option::of(name()),
+            select(vec![Hold::ZeroOrder, Hold::FirstOrder]),
+        )
+            .prop_map(|(column, unit, scale, scale_unit, hold)| {
+                ColumnMap::Full(Column {
+                    column,
+                    unit,
+                    scale,
+                    scale_unit,
+                    hold,
+                })
+            }),
     ]
 }
 
 fn measured() -> impl Strategy<Value = Measured> {
     let scale = option::of(finite());
-    (option::of(name()), option::of(name()), scale, sensor()).prop_map(
-        |(column, unit, scale, sensor)| Measured {
+    let unit = || option::of(name());
+    (option::of(name()), unit(), scale, unit(), sensor()).prop_map(
+        |(column, unit, scale, scale_unit, sensor)| Measured {
             column,
             unit,
             scale,
+            scale_unit,
             sensor,
         },
     )

@@ -97,6 +97,21 @@ fn plant(meta: &PlantMeta) -> String {
         );
         text.push_str(&parameters(&title, set.parameters));
     }
+    let derived = registry::derived(meta.id);
+    if !derived.is_empty() {
+        let rows: Vec<Vec<String>> = derived
+            .iter()
+            .map(|d| {
+                [d.id, d.unit, d.equation, d.doc]
+                    .map(str::to_owned)
+                    .to_vec()
+            })
+            .collect();
+        let head = columns(&["name", "unit", "equation", "what"], &rows);
+        text.push_str(&format!(
+            "\nWhat follows from them, shown with a fit\n{head}\n"
+        ));
+    }
     let effects = registry::effects();
     let rows: Vec<Vec<String>> = meta
         .channels

@@ -33,7 +33,7 @@ pub fn follow<'m, S: HostReal>(
     simulator.reset(x0, run.input(0));
     for k in 0..run.len() {
         if k > 0 {
-            simulator.advance(run.time[k] - start, run.input(k - 1));
+            simulator.advance_between(run.time[k] - start, run.input(k - 1), run.input(k));
         }
         simulator.measure(&mut predicted);
         each(k, &predicted, simulator);

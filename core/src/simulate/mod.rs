@@ -5,12 +5,14 @@ mod follow;
 mod history;
 mod observer;
 mod push;
+mod ramp;
 mod sensing;
 
 use std::borrow::Cow;
 
 use crate::model::Model;
 use crate::registry::HostReal;
+use crate::run::Hold;
 use crate::{NoPast, Place, Rk4, substeps};
 
 use bound::{Bounds, Scene};
@@ -18,6 +20,7 @@ pub use follow::{follow, free_run};
 use history::{Between, History};
 pub use observer::StateObserver;
 use push::Pushed;
+use ramp::{hold_means, ramped};
 use sensing::{Integral, Sensing, sense};
 
 /// Integrates a model through time.
@@ -48,6 +51,10 @@ pub struct Simulator<'m, S> {
     needed: Vec<usize>,
     time: f64,
     interval: f64,
+    /// How fast each input changes within the interval that is integrated, per second.
+    slopes: Vec<f64>,
+    /// Inputs that run on straight lines between samples.
+    ramped: Vec<usize>,
 }
 
 #[derive(Clone)]
@@ -129,6 +136,10 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             bounds,
             time: 0.0,
             interval: 0.0,
+            slopes: vec![0.0; nu],
+            ramped: (0..nu)
+                .filter(|i| model.hold(*i) == Hold::FirstOrder)
+                .collect(),
             model,
         };
         simulator.reset(&vec![S::zero(); nx], &vec![0.0; nu]);
@@ -284,7 +295,9 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             self.mark();
         }
         for bound in &self.bounds.input_memory {
-            if let (Some(history), Place::Input(i)) = (bound.history, bound.place) {
+            if let (Some(history), Place::Input(i)) = (bound.history, bound.place)
+                && self.slopes[i] == 0.0
+            {
                 self.histories[history].hold(self.time, S::of(input[i]));
             }
         }
@@ -293,7 +306,9 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         let steps = substeps(span, self.model.max_step);
         let h = span / steps as f64;
         for step in 0..steps {
-            self.step(start + h * step as f64, h, input);
+            let elapsed = h * step as f64;
+            self.apply(input, elapsed);
+            self.step(start + elapsed, h);
             if !self.bounds.output_memory.is_empty() {
                 self.time = start + h * (step + 1) as f64;
                 self.refresh();
@@ -304,11 +319,8 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         self.interval = span;
     }
 
-    /// One integration step.
-    fn step(&mut self, from: f64, h: f64, input: &[f64]) {
-        for (held, value) in self.scratch.held.iter_mut().zip(input) {
-            *held = S::of(*value);
-        }
+    /// One integration step, from the inputs in `held`; leaves those at its end there.
+    fn step(&mut self, from: f64, h: f64) {
         let Self {
             model,
             p,
@@ -321,9 +333,14 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             scratch,
             pushed,
             needed,
+            slopes,
             ..
         } = self;
         let model: &Model = model;
+        let ramping = slopes.iter().any(|s| *s != 0.0);
+        if ramping {
+            hold_means(bounds, histories, &mut scratch.held, slopes, from, h);
+        }
         for bound in &bounds.input_memory {
             let (Some(history), Place::Input(i)) = (bound.history, bound.place) else {
                 continue;
@@ -346,7 +363,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         scratch.w.copy_from_slice(&pushed.efforts);
         let (nx, nu) = (model.n_states(), model.plant.inputs.len());
         let dynamics = S::dynamics(model.dynamics);
-        if bounds.idle() && x.len() == nx && pushed.rates.is_empty() {
+        if bounds.idle() && x.len() == nx && pushed.rates.is_empty() && !ramping {
             // Nothing changes what acts on the plant within the step: half the time.
             dynamics.step(x, S::of(h), &scratch.held, &scratch.w, p);
             return;
@@ -362,6 +379,9 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             let interval = (time, time);
             let plant_x = &x[..nx];
             u.copy_from_slice(held);
+            if ramping {
+                ramped(u, bounds, slopes, time - from);
+            }
             signals[..nx].copy_from_slice(plant_x);
             let refresh = |u: &[S], signals: &mut [S]| {
                 signals[nx..nx + nu].copy_from_slice(u);
@@ -439,6 +459,9 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                 dx[to] = value;
             }
         });
+        if ramping {
+            ramped(held, bounds, slopes, h);
+        }
     }
 
     /// What the sensors read now. A mean is taken over the last [`Simulator::advance`]; at the

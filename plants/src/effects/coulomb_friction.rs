@@ -39,7 +39,7 @@ impl Effect<2, 0> for CoulombFriction {
         example: "[[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel = 0.9\n",
         places: &[PlaceKind::Effort],
         reads: &[Role::Flow],
-        yields_to: &[Role::Yaw],
+        yields_to: &[Role::Yaw, Role::Head],
         parameters: &[
             Parameter::new("level", "c", "channel", "size of the friction")
                 .within(0.0, f64::INFINITY)

@@ -42,6 +42,7 @@ impl Effect<5, 0> for DirectionalFriction {
         example: "[[effect]]\n[effect.directional_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel_forward = 0.6\nlevel_backward = 1.1\n",
         places: &[PlaceKind::Effort],
         reads: &[Role::Flow],
+        yields_to: &[Role::Head],
         simpler: &["coulomb_friction", "scrub_friction", "viscous_friction"],
         parameters: &[
             Parameter::new("level_forward", "c_f", "channel", "dry friction forwards")

@@ -39,6 +39,7 @@ impl Effect<2, 0> for GravityPendulum {
         example: "[[effect]]\n[effect.gravity_pendulum]\nat = [\"shaft\"]\ncosine = -1.4\n",
         places: &[PlaceKind::Effort],
         reads: &[Role::Shaft],
+        yields_to: &[Role::Gravity],
         parameters: &[
             Parameter::new("cosine", "a", "channel", "effort at angle zero")
                 .or(0.0)

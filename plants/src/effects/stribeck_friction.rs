@@ -39,6 +39,7 @@ impl Effect<4, 0> for StribeckFriction {
         example: "[[effect]]\n[effect.stribeck_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel = 0.8\nextra = 0.5\nspeed = 0.6\n",
         places: &[PlaceKind::Effort],
         reads: &[Role::Flow],
+        yields_to: &[Role::Head],
         simpler: &["coulomb_friction", "scrub_friction"],
         parameters: &[
             Parameter::new("level", "c", "channel", "friction in motion")

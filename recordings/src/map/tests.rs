@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use loopsight_core::run::{Column, ColumnMap, Measured};
+use loopsight_core::run::{Column, ColumnMap, Hold, Measured};
 use proptest::prelude::*;
 
 use super::*;
@@ -42,6 +42,8 @@ fn column(name: &str, unit: Option<&str>, scale: f64) -> ColumnMap {
         column: name.into(),
         unit: unit.map(str::to_owned),
         scale,
+        scale_unit: None,
+        hold: Hold::ZeroOrder,
     })
 }
 
@@ -374,4 +376,66 @@ proptest! {
             }
         }
     }
+}
+
+/// A transducer's volts stand for metres; a column that counts has a size per count.
+#[test]
+fn a_gain_with_a_unit_makes_another_quantity_of_a_column() {
+    let text = "time_s,voltage_V,probe_mV,ticks\n0,1,500,2\n1,2,-250,4\n2,1,0,6\n";
+    let signals = [
+        Signal::new("position", "q", "m", "."),
+        Signal::new("angle", "a", "rad", "."),
+    ];
+    let inputs = [Signal::new("force", "F", "N", ".")];
+    let gain = |name: &str, scale: f64, unit: &str| Measured {
+        column: Some(name.into()),
+        scale: Some(scale),
+        scale_unit: Some(unit.into()),
+        ..Measured::default()
+    };
+    let mut force = column("voltage", None, 3.0);
+    if let ColumnMap::Full(column) = &mut force {
+        column.scale_unit = Some("N/V".into());
+    }
+    let log_map = LogMap {
+        inputs: BTreeMap::from([("force".into(), force)]),
+        measured: BTreeMap::from([
+            ("position".into(), gain("probe", 20.0, "mm/V")),
+            ("angle".into(), gain("ticks", 0.1, "rad")),
+        ]),
+        ..LogMap::default()
+    };
+    let source = Source::Table(read_csv_from(text.as_bytes(), "log.csv").unwrap());
+    let run = map(&source, &inputs, &signals, &log_map).unwrap().runs;
+    assert_eq!(run[0].inputs, [3.0, 6.0, 3.0]);
+    for (found, expected) in run[0].measured.iter().zip([0.01, 0.2, -0.005, 0.4]) {
+        assert!((found - expected).abs() < 1e-15, "{found} {expected}");
+    }
+
+    let wrong = LogMap {
+        measured: BTreeMap::from([("position".into(), gain("probe", 1.0, "N/V"))]),
+        ..log_map
+    };
+    let error = map(&source, &inputs, &signals, &wrong).unwrap_err();
+    assert!(error.to_string().contains("mV times N/V"), "{error}");
+}
+
+#[test]
+fn an_optional_input_without_a_column_is_zero() {
+    let text = "time_s,voltage_V,speed_rad_per_s\n0,1,0\n1,2,1\n2,1,2\n";
+    let inputs = [
+        Signal::new("voltage", "u", "V", "."),
+        Signal::new("added", "d", "V", ".").optional(),
+    ];
+    let signals = [Signal::new("speed", "w", "rad/s", ".")];
+    let read = |text: &str| {
+        let source = Source::Table(read_csv_from(text.as_bytes(), "log.csv").unwrap());
+        map(&source, &inputs, &signals, &LogMap::default()).unwrap()
+    };
+    assert_eq!(read(text).runs[0].inputs, [1.0, 0.0, 2.0, 0.0, 1.0, 0.0]);
+    let with = text
+        .replace("time_s", "added_V,time_s")
+        .replace('\n', "\n7,");
+    let with = with.trim_end_matches("7,");
+    assert_eq!(read(with).runs[0].inputs[1], 7.0);
 }

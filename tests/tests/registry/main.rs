@@ -122,6 +122,11 @@ fn plants_keep_their_word() {
             let key = meta.parameters.iter().find(|p| p.id == set.id);
             assert!(key.is_none(), "{of}: also the name of a parameter");
         }
+        for quantity in loopsight_core::registry::derived(meta.id) {
+            said(&of, quantity.id, quantity.equation);
+            said(&of, quantity.id, quantity.doc);
+            unit(&of, quantity.unit);
+        }
         for state in meta.controlled {
             assert!(
                 *state < meta.states.len(),
@@ -136,6 +141,8 @@ fn plants_keep_their_word() {
             Vec::<&str>::new(),
             "{of}: the example"
         );
+        let derived = model.derived(&model.values());
+        assert!(derived.iter().all(|(_, v)| v.is_finite()), "{of}: derived");
     }
 }
 
