@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::{Model, pseudo_inverse};
+use crate::registry::HostReal;
 use crate::{DUAL_WIDTH, Dual, Real, derivative, variable};
 
 impl Model {
@@ -35,6 +36,34 @@ impl Model {
             }
         }
         (jacobian, value)
+    }
+
+    /// Plant states that a measured signal or its rate is a function of, near the origin: those whose
+    /// initial values show at the beginning of a run. A position that is measured shows its
+    /// velocity, too.
+    pub fn seen_states(&self, values: &[f64]) -> Vec<usize> {
+        let (nx, nu) = (self.n_states(), self.plant.inputs.len());
+        let (of_state, _) = self.measurement_jacobian(values, &vec![0.0; nx]);
+        let p: Vec<Dual> = self.lower(&values.iter().map(|v| Dual::of(*v)).collect::<Vec<_>>());
+        let (u, w) = (
+            vec![Dual::of(0.0); nu],
+            vec![Dual::of(0.0); self.n_efforts()],
+        );
+        let mut rates = DMatrix::zeros(nx, nx);
+        for column in 0..nx {
+            let mut x = vec![Dual::of(0.0); nx];
+            x[column] = variable(0.0, 0);
+            let mut dx = vec![Dual::of(0.0); nx];
+            Dual::dynamics(self.dynamics).derivative(&x, &u, &w, &p, &mut dx);
+            for (row, rate) in dx.iter().enumerate() {
+                rates[(row, column)] = derivative(rate, 0);
+            }
+        }
+        let of_rate = &of_state * rates;
+        let shows = |m: &DMatrix<f64>, i: usize| m.column(i).iter().any(|v| *v != 0.0);
+        (0..nx)
+            .filter(|i| shows(&of_state, *i) || shows(&of_rate, *i))
+            .collect()
     }
 
     /// The state of least norm that explains the measurement `y` (NaN entries are left out):

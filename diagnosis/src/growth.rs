@@ -11,6 +11,10 @@ const TOLERATED: f64 = 10.0;
 const EXPONENTIAL: f64 = 3.0;
 /// An entry of a transition beyond which there is no need to look further.
 const CERTAINLY: f64 = 1e9;
+/// Share of what is followed at whose end errors must still be as large: others were a transient.
+const LATE: f64 = 0.1;
+/// Errors that need not be followed any further, in deviations of what is measured.
+const BEYOND_DOUBT: f64 = 1e9;
 /// Instants of a run from which errors are followed, as fractions of its length.
 const STARTS: [f64; 3] = [0.0, 0.25, 0.5];
 /// Share of the instants from which errors must grow.
@@ -84,6 +88,9 @@ impl Growth {
                 let first = (start * path.a.len() as f64) as usize;
                 let mut m = DMatrix::from_fn(nx, nx, |i, j| if i == j { size[i] } else { 0.0 });
                 followed += usize::from(first < path.a.len());
+                let mut grown = None;
+                let mut late = 0.0f64;
+                let ending = path.a.len() - ((path.a.len() - first) as f64 * LATE) as usize;
                 for k in first..path.a.len() {
                     let y = &path.c[k] * &m;
                     m = &path.a[k] * m;
@@ -97,12 +104,22 @@ impl Growth {
                             }
                         }
                     }
-                    if most > TOLERATED {
+                    if most > TOLERATED && grown.is_none() {
                         let time = path.time[k + 1] - path.time[first];
-                        times.push(time);
-                        rates.push(radius(&m, &size).ln() / time);
+                        grown = Some((time, radius(&m, &size).ln() / time));
+                    }
+                    if k >= ending {
+                        late = late.max(most);
+                    }
+                    if most > BEYOND_DOUBT {
+                        late = most;
                         break;
                     }
+                }
+                // What a stiff loop makes of an error is large and soon over.
+                if let (Some((time, rate)), true) = (grown, late > TOLERATED) {
+                    times.push(time);
+                    rates.push(rate);
                 }
             }
         }
@@ -181,6 +198,16 @@ mod tests {
         let decay = (-2.0 * PERIOD).exp();
         let damped = [1.0, PERIOD, 0.0, decay];
         assert_eq!(Growth::of(&[path(damped, [1.0, 1.7])], &[0.7]), None);
+    }
+
+    /// A stiff oscillation makes a hundred units of speed of one of position, and dies out.
+    #[test]
+    fn a_swing_that_dies_out_is_no_growth() {
+        let (decay, rate) = ((-2.0 * PERIOD).exp(), 100.0f64);
+        let (sin, cos) = (rate * PERIOD).sin_cos();
+        // The speed comes first: it is measured.
+        let swing = [cos, -rate * sin, sin / rate, cos].map(|v| decay * v);
+        assert_eq!(Growth::of(&[path(swing, [1.0, 1.7])], &[0.7]), None);
     }
 
     #[test]

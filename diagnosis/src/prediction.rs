@@ -8,21 +8,13 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::positions::{Positions, run_with};
 
-/// Plant states of which a measured signal is a direct function: those an initial state can be
-/// estimated for from the first samples. The others start at zero.
-fn visible_states(model: &Model, values: &[f64]) -> Vec<usize> {
-    let (jacobian, _) = model.measurement_jacobian(values, &vec![0.0; model.n_states()]);
-    (0..model.n_states())
-        .filter(|i| jacobian.column(*i).iter().any(|v| *v != 0.0))
-        .collect()
-}
-
-/// Plant states whose initial values are estimated: the visible ones, and where the runs are held to
-/// the measurements all that those say something about.
+/// Plant states whose initial values are estimated: those that show at the beginning of a run, and where
+/// the runs are held to the measurements all that those say something about. The others start at
+/// zero.
 pub(crate) fn estimated_states(model: &Model, values: &[f64], runs: &[Run]) -> Vec<usize> {
     let observer = runs.iter().find_map(|run| run.observer.as_deref());
     observer.map_or_else(
-        || visible_states(model, values),
+        || model.seen_states(values),
         |observer| observer.observed.clone(),
     )
 }
