@@ -9,12 +9,10 @@ use crate::observer::Step;
 const TOLERATED: f64 = 10.0;
 /// What has grown so much in the time of the whole horizon grows exponentially.
 const EXPONENTIAL: f64 = 3.0;
-/// An entry of a transition beyond which there is no need to look further.
+/// Growth beyond which there is no need to look further.
 const CERTAINLY: f64 = 1e9;
 /// Share of what is followed at whose end errors must still be as large: others were a transient.
 const LATE: f64 = 0.1;
-/// Errors that need not be followed any further, in deviations of what is measured.
-const BEYOND_DOUBT: f64 = 1e9;
 /// Instants of a run from which errors are followed, as fractions of its length.
 const STARTS: [f64; 3] = [0.0, 0.25, 0.5];
 /// Share of the instants from which errors must grow.
@@ -111,7 +109,7 @@ impl Growth {
                     if k >= ending {
                         late = late.max(most);
                     }
-                    if most > BEYOND_DOUBT {
+                    if most > CERTAINLY {
                         late = most;
                         break;
                     }

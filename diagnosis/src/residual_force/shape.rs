@@ -48,6 +48,8 @@ const fn word(role: Role) -> &'static str {
         Role::Centrifugal => "centrifugal",
         Role::Shaft => "shaft",
         Role::Stall => "stall",
+        Role::Gravity => "gravity",
+        Role::Head => "head",
     }
 }
 
