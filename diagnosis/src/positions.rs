@@ -84,7 +84,7 @@ impl Positions {
             let mut interval = 0.0;
             if k > 0 {
                 interval = run.time[k] - run.time[k - 1];
-                simulator.advance(run.time[k] - start, run.input(k - 1));
+                simulator.advance_between(run.time[k] - start, run.input(k - 1), run.input(k));
             }
             simulator.measure(&mut predicted);
             each(k, &predicted);
