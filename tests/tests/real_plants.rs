@@ -124,7 +124,7 @@ fn emps_is_identified_through_its_loop() {
         );
         assert!(off.abs() < 0.01, "{name}: {off}");
     }
-    let directional = model("emps.toml", |text| {
+    let mut directional = model("emps.toml", |text| {
         text.replace("coulomb_friction]", "directional_friction]")
             .replace(
                 "level = 10.0",
@@ -137,10 +137,7 @@ fn emps_is_identified_through_its_loop() {
                 "[\"velocity_lag\"]\nfixed = [\"viscous_friction\"]",
             )
     });
-    let directional = Model {
-        measured: symmetric.measured.clone(),
-        ..directional
-    };
+    directional.measured.clone_from(&symmetric.measured);
     let directed = fitted(&directional, &log);
     let errors = |fit: &Fit| {
         [&log, &pulses].map(|runs| {
