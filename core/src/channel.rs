@@ -125,6 +125,8 @@ impl Role {
             Role::Centrifugal => "centrifugal",
             Role::Shaft => "shaft",
             Role::Stall => "stall",
+            Role::Gravity => "gravity",
+            Role::Head => "head",
         }
     }
 

@@ -13,8 +13,8 @@ pub use crate::configured::{ConfiguredEffect, ConfiguredPlant, Values, range_tex
 use crate::model::{Model, ModelError};
 use crate::run::Run;
 use crate::{
-    Channel, Controller, Derived, Driver, DriverError, DriverFault, Dual, Dynamics, EffectMeta, Estimator,
-    Physics, PlantMeta, Real,
+    Channel, Controller, Derived, Driver, DriverError, DriverFault, Dual, Dynamics, EffectMeta,
+    Estimator, Physics, PlantMeta, Real,
 };
 
 /// A scalar that composed models are run with on a host.

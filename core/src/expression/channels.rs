@@ -44,6 +44,10 @@ pub(crate) struct ChannelTable {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     stall: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    gravity: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    head: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     side: Option<i8>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     size: Option<f64>,
@@ -65,6 +69,8 @@ impl ChannelTable {
             Role::Centrifugal => &self.centrifugal,
             Role::Shaft => &self.shaft,
             Role::Stall => &self.stall,
+            Role::Gravity => &self.gravity,
+            Role::Head => &self.head,
         }
         .as_deref()
     }
