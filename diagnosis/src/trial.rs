@@ -139,14 +139,19 @@ fn coarse(candidate: &Candidate) -> Model {
     model
 }
 
-/// What a candidate promises to leave of the cost, from one start.
+/// What a candidate promises to leave of the cost, from one start; what has a list of starts is held
+/// there, for another start does better than a long step.
 pub(crate) fn promise(
     candidate: &Candidate,
     start: &[f64],
     holdout: &Holdout<'_>,
     nominal: &Solution,
 ) -> Option<f64> {
-    let model = coarse(candidate);
+    let mut model = coarse(candidate);
+    for i in candidate.own() {
+        let parameter = &mut model.parameters[i];
+        parameter.free &= parameter.declaration.starts.is_empty();
+    }
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
     let mut problem =
         Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {}).ok()?;
