@@ -200,3 +200,35 @@ fn described(robot: Robot, run: &Run) -> Option<ResidualForce> {
     let fitted = fit::fit(&model, runs, None, &[], &FitSettings::default(), &|_, _| {}).unwrap();
     residual_force(&fitted.model, runs)
 }
+
+/// What is printed can be pasted: the file is read, fitted, and the error falls to the noise.
+#[test]
+fn the_printed_expression_makes_the_error_fall() {
+    let out_of_round: Force = |v, a, _, _| -0.9 * v * a.sin().abs();
+    let one_way: Force = |v, _, _, _| -0.15 * v.max(0.0).powi(2) - 0.05 * v.max(0.0).powi(3);
+    for (robot, law, variables) in [
+        (Robot::Twil, out_of_round, &["flow", "position"][..]),
+        (Robot::Axis, one_way, &["flow"]),
+    ] {
+        let run = record(robot, law, levels, 3);
+        let runs = std::slice::from_ref(&run);
+        let fitted = |text: &str| {
+            let model = Model::from_toml("hidden", text).unwrap().0;
+            fit::fit(&model, runs, None, &[], &FitSettings::default(), &|_, _| {}).unwrap()
+        };
+        let plain = fitted(&robot.model_toml());
+        let found = residual_force(&plain.model, runs).unwrap();
+        let expression = found.expression.unwrap();
+        for variable in variables {
+            assert!(expression.force.contains(variable), "{}", expression.force);
+        }
+        let pasted = fitted(&format!("{}\n{}", robot.model_toml(), expression.toml));
+        assert!(
+            pasted.comparison.nrmse < 0.4 * plain.comparison.nrmse,
+            "{} of {}: {}",
+            pasted.comparison.nrmse,
+            plain.comparison.nrmse,
+            expression.toml
+        );
+    }
+}

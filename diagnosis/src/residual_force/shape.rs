@@ -34,30 +34,11 @@ pub(super) enum Shape {
     Product(Box<Shape>, Box<Shape>),
 }
 
-/// A role's name in an expression.
-const fn word(role: Role) -> &'static str {
-    match role {
-        Role::Flow => "flow",
-        Role::Position => "position",
-        Role::Drive => "drive",
-        Role::Heading => "heading",
-        Role::Forward => "forward",
-        Role::Yaw => "yaw",
-        Role::Load => "load",
-        Role::Armature => "armature",
-        Role::Centrifugal => "centrifugal",
-        Role::Shaft => "shaft",
-        Role::Stall => "stall",
-        Role::Gravity => "gravity",
-        Role::Head => "head",
-    }
-}
-
 impl Variable {
     /// Name in an expression.
     pub(super) fn name(self) -> &'static str {
         match self {
-            Variable::Role(role) => word(role),
+            Variable::Role(role) => role.id(),
             Variable::Time => "time",
         }
     }
