@@ -22,7 +22,8 @@ pub(crate) const FINAL: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
 };
-/// Longest integration step of a first look, s: far below what any sensor sees.
+/// Longest integration steps of a promise and of a first look, s: below what most sensors see.
+const PROMISE_STEP: f64 = 0.01;
 const LOOK_STEP: f64 = 0.005;
 
 /// Most starts of a candidate that is looked at from where a simpler one ended.
@@ -132,10 +133,10 @@ pub(crate) fn starts(
     all
 }
 
-/// The model of a candidate for a first look: coarser steps, far below what a sensor sees.
-fn coarse(candidate: &Candidate) -> Model {
+/// The model of a candidate with coarser steps.
+fn coarse(candidate: &Candidate, step: f64) -> Model {
     let mut model = candidate.model.clone();
-    model.max_step = model.max_step.max(LOOK_STEP);
+    model.max_step = model.max_step.max(step);
     model
 }
 
@@ -147,7 +148,7 @@ pub(crate) fn promise(
     holdout: &Holdout<'_>,
     nominal: &Solution,
 ) -> Option<f64> {
-    let mut model = coarse(candidate);
+    let mut model = coarse(candidate, PROMISE_STEP);
     for i in candidate.own() {
         let parameter = &mut model.parameters[i];
         parameter.free &= parameter.declaration.starts.is_empty();
@@ -173,7 +174,7 @@ pub(crate) fn look(
     holdout: &Holdout<'_>,
     nominal: &Solution,
 ) -> Option<Judged> {
-    let model = coarse(candidate);
+    let model = coarse(candidate, LOOK_STEP);
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
     let problem = || Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {});
     let mut start = start.to_vec();
