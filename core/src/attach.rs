@@ -201,14 +201,36 @@ impl Model {
                     }
                 }
             } else {
-                model.parameters.extend_from_slice(old);
-                let mut kept = effect.clone();
-                kept.first_parameter = first;
-                model.effects.push(kept);
+                model.keep(effect, old);
             }
         }
         make_names_unique(&mut model.parameters, &model.effects);
         Some(model)
+    }
+
+    /// The model without its `index`-th effect.
+    pub fn without_effect(&self, index: usize) -> Option<Model> {
+        self.effects.get(index)?;
+        let mut model = self.clone();
+        model.effects.clear();
+        model.parameters.truncate(self.n_plant_parameters);
+        for (k, effect) in self.effects.iter().enumerate() {
+            if k != index {
+                let first = effect.first_parameter;
+                let own = &self.parameters[first..first + effect.meta.parameters.len()];
+                model.keep(effect, own);
+            }
+        }
+        make_names_unique(&mut model.parameters, &model.effects);
+        Some(model)
+    }
+
+    /// Takes an effect of another model over, with its parameters.
+    fn keep(&mut self, effect: &Attached, own: &[ModelParameter]) {
+        let mut kept = effect.clone();
+        kept.first_parameter = self.parameters.len();
+        self.parameters.extend_from_slice(own);
+        self.effects.push(kept);
     }
 }
 

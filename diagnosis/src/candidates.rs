@@ -12,6 +12,9 @@ pub(crate) struct Candidate {
     pub(crate) at: Vec<&'static str>,
     /// Each channel has parameters of its own; else they share them.
     pub(crate) separate: bool,
+    /// What it takes the place of, since it contains it: the id, and the parameters of the nominal
+    /// model that are gone.
+    pub(crate) replaces: Option<(&'static str, std::ops::Range<usize>)>,
     /// The model with it, at neutral parameters.
     pub(crate) model: Model,
     /// Root mean square of the flow at its channels in the recording; 0 where there is none.
@@ -51,11 +54,11 @@ impl Candidate {
             .count()
     }
 
-    /// The candidate with its sign smoothed over less; none where it has no sign.
-    pub(crate) fn sharp(&self) -> Option<Self> {
+    /// The candidate with its sign smoothed over this share of the flow; none where it has no sign.
+    pub(crate) fn smoothed(&self, share: f64) -> Option<Self> {
         let mut sharp = self.clone();
         let n = self.instances();
-        smooth(&mut sharp.model, n, SHARP * sharp.flow).then_some(sharp)
+        smooth(&mut sharp.model, n, share * sharp.flow).then_some(sharp)
     }
 
     /// The candidate with the values of `start` for those of its parameters that are not estimated.
@@ -72,8 +75,9 @@ impl Candidate {
 }
 
 /// All candidates for `model`: each effect at every single channel it fits, and at all channels of a
-/// family (both wheels, all inputs), alike and each with its own parameters. What the model already has at the same channels, and
-/// what acts on a signal that is not measured, is left out.
+/// family (both wheels, all inputs), alike and each with its own parameters. What the model already
+/// has at the same channels, and what acts on a signal that is not measured, is left out; what
+/// contains an effect that the model has there takes its place.
 ///
 /// `rms` holds the root mean squares of the plant's signals in the recording: smoothing widths are
 /// set from it, since what suits a robot's wheels does not suit a flywheel.
@@ -88,13 +92,27 @@ pub(crate) fn candidates(model: &Model, rms: &[f64]) -> Vec<Candidate> {
             if present {
                 continue;
             }
+            let contained = model.effects.iter().position(|e| {
+                meta.simpler.contains(&e.meta.id)
+                    && e.at.iter().map(|c| c.id).eq(at.iter().copied())
+            });
+            let replaces = contained.map(|index| {
+                let effect = &model.effects[index];
+                let first = effect.first_parameter;
+                (effect.meta.id, first..first + effect.meta.parameters.len())
+            });
+            let base = match contained {
+                Some(index) => model.without_effect(index),
+                None => Some(model.clone()),
+            };
             let each: Vec<&[&str]> = at.chunks(1).collect();
             let ways: &[(bool, &[&[&str]])] = &[(false, &[&at]), (true, &each)];
             for (separate, sets) in ways {
-                if *separate && (at.len() < 2 || meta.shared_only || meta.sided) {
+                let alike_only = meta.shared_only || meta.sided || replaces.is_some();
+                if *separate && (at.len() < 2 || alike_only) {
                     continue;
                 }
-                let mut with = Some(model.clone());
+                let mut with = base.clone();
                 let mut flow = 0.0;
                 for set in *sets {
                     with = with.and_then(|m| m.with_effect(meta.id, set));
@@ -107,6 +125,7 @@ pub(crate) fn candidates(model: &Model, rms: &[f64]) -> Vec<Candidate> {
                         meta,
                         at: at.clone(),
                         separate: *separate,
+                        replaces: replaces.clone(),
                         model,
                         flow,
                     });
@@ -119,8 +138,6 @@ pub(crate) fn candidates(model: &Model, rms: &[f64]) -> Vec<Candidate> {
 
 /// Share of the flow over which a sign is smoothed: wide enough for a fit to find its way.
 const WIDTH: f64 = 0.02;
-/// The same in a final fit, which starts near its end: what sticks, sticks.
-const SHARP: f64 = 0.004;
 
 /// Gives the last effect of `model` the widths that suit the recording; returns the root mean
 /// square of the flow at its channels.

@@ -22,7 +22,7 @@ use crate::prediction::signal_rms;
 use crate::problem::Problem;
 use crate::residual_force;
 use crate::sufficiency;
-use crate::trial::{FINAL, Judged, finish, grown, look, promise, starts};
+use crate::trial::{FINAL, Judged, finish, first_starts, grown, look, promise};
 use crate::where_it_fails::where_it_fails;
 
 /// Explanations that are reported.
@@ -116,7 +116,7 @@ pub(crate) fn diagnose_above(
         .enumerate()
         .filter(|(_, c)| !c.separate)
         .flat_map(|(i, c)| {
-            starts(c, &nominal.values, &BTreeMap::new(), duration)
+            first_starts(c, &fitted_nominal, duration)
                 .into_iter()
                 .map(move |start| (i, start))
         })
@@ -195,21 +195,7 @@ pub(crate) fn diagnose_above(
 
     let mut finalists: Vec<(Judged, Fit)> = judged
         .into_par_iter()
-        .filter_map(|first| {
-            // What sticks is fitted sharply, unless the machine does not stick so.
-            let sharp = first.candidate.sharp().and_then(|candidate| {
-                let first = Judged {
-                    candidate,
-                    ..first.clone()
-                };
-                finish(first, &holdout, &nominal)
-            });
-            let good = |(sharp, _): &(Judged, Fit)| nrmse(&sharp.rank) < nrmse(&first.rank);
-            match sharp {
-                Some(sharp) if good(&sharp) => Some(sharp),
-                _ => finish(first, &holdout, &nominal),
-            }
-        })
+        .filter_map(|first| finish(first, &holdout, &nominal))
         .collect();
     finalists.sort_by(|a, b| nrmse(&a.0.rank).total_cmp(&nrmse(&b.0.rank)));
 
@@ -337,6 +323,9 @@ fn explain(
 /// What to know about a fitted explanation.
 fn note(fit: &Fit, candidate: &Candidate) -> String {
     let mut words = vec![candidate.meta.symptom.to_owned()];
+    if let Some((simpler, _)) = &candidate.replaces {
+        words.push(format!("in place of {simpler}, which it contains"));
+    }
     for (name, estimate) in &fit.parameters {
         if matches!(
             estimate.verdict,

@@ -127,21 +127,24 @@ fn first_values(model: &Model, runs: &[Run], settings: &FitSettings) -> Option<V
 /// Rows of a Jacobian beyond this multiple of the median row are cut to it.
 const STEEP: f64 = 100.0;
 
+/// Norms of the rows, and the one in the middle of those that are not zero.
+fn row_norms(jacobian: &DMatrix<f64>) -> (Vec<f64>, f64) {
+    let norms: Vec<f64> = jacobian.row_iter().map(|row| row.norm()).collect();
+    let mut some: Vec<f64> = norms.iter().copied().filter(|n| *n > 0.0).collect();
+    if some.is_empty() {
+        return (norms, 0.0);
+    }
+    let middle = some.len() / 2;
+    let median = *some.select_nth_unstable_by(middle, f64::total_cmp).1;
+    (norms, median)
+}
+
 /// A shaft about to break loose is a switch: at that instant the free run answers to its parameters
 /// without bound, all of them alike, and one such row would hide what the others tell.
 fn limit_rows(jacobian: &mut DMatrix<f64>) {
-    let mut norms: Vec<f64> = jacobian
-        .row_iter()
-        .map(|row| row.norm())
-        .filter(|norm| *norm > 0.0)
-        .collect();
-    if norms.is_empty() {
-        return;
-    }
-    let middle = norms.len() / 2;
-    let limit = STEEP * *norms.select_nth_unstable_by(middle, f64::total_cmp).1;
-    for mut row in jacobian.row_iter_mut() {
-        let norm = row.norm();
+    let (norms, median) = row_norms(jacobian);
+    let limit = STEEP * median;
+    for (mut row, norm) in jacobian.row_iter_mut().zip(norms) {
         if norm > limit {
             row *= limit / norm;
         }
@@ -149,6 +152,12 @@ fn limit_rows(jacobian: &mut DMatrix<f64>) {
 }
 
 impl Problem<'_> {
+    /// The steepest row of the Jacobian over the one in the middle.
+    pub(crate) fn steepness(&self, at: &DVector<f64>) -> f64 {
+        let (norms, median) = row_norms(&self.linearise(at).1);
+        norms.into_iter().fold(0.0, f64::max) / median
+    }
+
     /// What is said of a solution.
     pub(crate) fn result(&self, solution: &DVector<f64>) -> Fit {
         let (mut values, _) = self.unpack(solution);

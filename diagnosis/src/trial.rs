@@ -26,6 +26,8 @@ pub(crate) const FINAL: Effort = Effort {
 const PROMISE_STEP: f64 = 0.01;
 const LOOK_STEP: f64 = 0.005;
 
+/// So many starts of one parameter are a dense list.
+const DENSE: usize = 20;
 /// Most starts of a candidate that is looked at from where a simpler one ended.
 const GROWN: usize = 3;
 /// An effect at several channels alike is tried at each with its own parameters where it leaves less
@@ -65,7 +67,7 @@ pub(crate) fn grown(
                 let divides = candidate.separate
                     && candidate.meta.id == other.meta.id
                     && nrmse(&found.rank) < WORTH_DIVIDING * nrmse(nominal_rank);
-                (contains && !candidate.separate || divides)
+                (contains && !candidate.separate && candidate.replaces.is_none() || divides)
                     && candidate.at == other.at
                     && !other.separate
             })
@@ -91,9 +93,25 @@ pub(crate) fn grown(
         .collect()
 }
 
+/// Values to start a candidate from: the `nominal` model's, without those of an effect that it takes
+/// the place of; what has the same name begins where that one was.
+pub(crate) fn first_starts(candidate: &Candidate, nominal: &Model, duration: f64) -> Vec<Vec<f64>> {
+    let mut base = nominal.values();
+    let mut known = BTreeMap::new();
+    if let Some((_, gone)) = &candidate.replaces {
+        for parameter in &nominal.parameters[gone.clone()] {
+            if let (true, Some(value)) = (parameter.free, parameter.value) {
+                known.insert(parameter.declaration.id, value);
+            }
+        }
+        base.drain(gone.clone());
+    }
+    starts(candidate, &base, &known, duration)
+}
+
 /// Values to start a candidate from: those of the rest of the model from `base`, its own as `known`,
 /// else a noticeable step from neutral.
-pub(crate) fn starts(
+fn starts(
     candidate: &Candidate,
     base: &[f64],
     known: &BTreeMap<&str, f64>,
@@ -140,8 +158,8 @@ fn coarse(candidate: &Candidate, step: f64) -> Model {
     model
 }
 
-/// What a candidate promises to leave of the cost, from one start; what has a list of starts is held
-/// there, for another start does better than a long step.
+/// What a candidate promises to leave of the cost, from one start; what has a dense list of starts is
+/// held there, for another start does better than a long step.
 pub(crate) fn promise(
     candidate: &Candidate,
     start: &[f64],
@@ -151,7 +169,7 @@ pub(crate) fn promise(
     let mut model = coarse(candidate, PROMISE_STEP);
     for i in candidate.own() {
         let parameter = &mut model.parameters[i];
-        parameter.free &= parameter.declaration.starts.is_empty();
+        parameter.free &= parameter.declaration.starts.len() < DENSE;
     }
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
     let mut problem =
@@ -194,19 +212,57 @@ pub(crate) fn look(
     })
 }
 
-/// The full fit of a finalist, initial states included, with intervals.
+/// The full fit of a finalist, initial states included, with intervals: as sharply as it can be where
+/// it has a sign, unless the machine does not stick so.
 pub(crate) fn finish(
     first: Judged,
     holdout: &Holdout<'_>,
     nominal: &Solution,
+) -> Option<(Judged, Fit)> {
+    for share in SHARP {
+        let Some(candidate) = first.candidate.smoothed(share) else {
+            break;
+        };
+        let sharp = Judged {
+            candidate,
+            ..first.clone()
+        };
+        match fully(sharp, holdout, nominal, WILD) {
+            Some(found) if nrmse(&found.0.rank) < nrmse(&first.rank) => return Some(found),
+            // Less sharp, then.
+            _ => {}
+        }
+    }
+    fully(first, holdout, nominal, f64::INFINITY)
+}
+
+/// Shares of the flow over which a sign is smoothed in a final fit, which starts near its end: what
+/// sticks, sticks.
+const SHARP: [f64; 2] = [0.004, 0.01];
+/// Where the steepest row of a Jacobian is so many times the one in the middle, the steps of the
+/// integrator are too long for what is to stick.
+const WILD: f64 = 1e4;
+
+/// The full fit; none where its derivatives run wild.
+fn fully(
+    first: Judged,
+    holdout: &Holdout<'_>,
+    nominal: &Solution,
+    wild: f64,
 ) -> Option<(Judged, Fit)> {
     let quiet = |_: u64, _: f64| {};
     let model = &first.candidate.model;
     let mut problem =
         Problem::with(model, holdout.runs, holdout.seen.as_deref(), None, &quiet).ok()?;
     let start = problem.pack(&first.solution.values, &nominal.states);
+    if problem.steepness(&start) > wild {
+        return None;
+    }
     let start = problem.balance(start);
     let found = problem.solve(&start, FINAL).ok()?;
+    if problem.steepness(&found) > wild {
+        return None;
+    }
     let fit = problem.result(&found);
     let solution = problem.solution(&found);
     let losses = holdout.judge(model, &solution);

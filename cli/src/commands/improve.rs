@@ -1,7 +1,8 @@
 //! `loopsight improve`.
 
 use loopsight_core::config::{Source, Step};
-use loopsight_diagnosis::{Fit, Improvement, improve};
+use loopsight_core::model::{Attached, Model, ModelParameter};
+use loopsight_diagnosis::{Improvement, improve};
 use loopsight_report::{improvement_page, save};
 
 use crate::arguments::ImproveOptions;
@@ -35,10 +36,7 @@ pub(crate) fn run(options: &ImproveOptions) -> Result<(), Failure> {
         output::json(&improvement)?;
     }
     if let (Some(path), Some(best)) = (&options.output, &improvement.best) {
-        save_text(
-            path,
-            &best_text(&loaded.source, loaded.model.effects.len(), best),
-        )?;
+        save_text(path, &best_text(&loaded.source, &loaded.model, &best.model))?;
     }
     if let Some(path) = &options.html {
         let shown = test.as_deref().unwrap_or(&loaded.runs);
@@ -53,39 +51,59 @@ pub(crate) fn run(options: &ImproveOptions) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The model file with the added effects and all fitted values.
-fn best_text(source: &Source, effects_before: usize, best: &Fit) -> String {
+/// The model file with the effects of `best` and all fitted values; what it has not is taken out.
+fn best_text(source: &Source, before: &Model, best: &Model) -> String {
+    let is = |a: &Attached, b: &Attached| {
+        a.meta.id == b.meta.id && a.at.iter().map(|c| c.id).eq(b.at.iter().map(|c| c.id))
+    };
     let mut text = source.text.clone();
-    for effect in &best.model.effects[effects_before..] {
+    let mut edit = |change: &dyn Fn(&Source) -> String| {
+        if let Ok(present) = Source::parse(&source.file, &text) {
+            text = change(&present);
+        }
+    };
+    for (index, effect) in before.effects.iter().enumerate().rev() {
+        if !best.effects.iter().any(|e| is(e, effect)) {
+            edit(&|present| present.without_effect(index));
+        }
+    }
+    for effect in &best.effects {
+        if before.effects.iter().any(|e| is(e, effect)) {
+            continue;
+        }
         let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
-        let parameters: Vec<(&str, f64)> = effect
-            .meta
-            .parameters
-            .iter()
-            .enumerate()
-            .filter_map(|(i, p)| {
-                Some((
-                    p.id,
-                    best.model.parameters[effect.first_parameter + i].value?,
-                ))
-            })
+        let own = best.parameters.iter().skip(effect.first_parameter);
+        let parameters: Vec<(&str, f64)> = own
+            .zip(effect.meta.parameters)
+            .filter_map(|(parameter, declaration)| Some((declaration.id, parameter.value?)))
             .collect();
-        let Ok(present) = Source::parse(&source.file, &text) else {
-            return text;
-        };
-        text = present.with_effect(effect.meta.id, &at, &parameters);
+        edit(&|present| present.with_effect(effect.meta.id, &at, &parameters));
     }
-    let values: Vec<(Vec<Step>, f64)> = best
-        .model
-        .parameters
-        .iter()
-        .filter(|p| p.free)
-        .filter_map(|p| Some((p.path.clone(), p.value?)))
+    // Where they stand now.
+    let Ok((model, present)) = Model::from_toml(&source.file, &text) else {
+        return text;
+    };
+    let mut pairs: Vec<(&ModelParameter, &ModelParameter)> = Vec::new();
+    let n = |m: &Model| {
+        m.effects
+            .first()
+            .map_or(m.parameters.len(), |e| e.first_parameter)
+    };
+    let plant = model.parameters.iter().take(n(&model));
+    pairs.extend(plant.zip(best.parameters.iter().take(n(best))));
+    for effect in &model.effects {
+        if let Some(found) = best.effects.iter().find(|e| is(e, effect)) {
+            let to = model.parameters.iter().skip(effect.first_parameter);
+            let from = best.parameters.iter().skip(found.first_parameter);
+            pairs.extend(to.zip(from).take(effect.meta.parameters.len()));
+        }
+    }
+    let values: Vec<(Vec<Step>, f64)> = pairs
+        .into_iter()
+        .filter(|(_, from)| from.free)
+        .filter_map(|(to, from)| Some((to.path.clone(), from.value?)))
         .collect();
-    match Source::parse(&source.file, &text) {
-        Ok(present) => present.with_values(&values),
-        Err(_) => text,
-    }
+    present.with_values(&values)
 }
 
 fn text(improvement: &Improvement) -> String {

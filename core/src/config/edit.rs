@@ -46,6 +46,18 @@ impl Source {
         }
         document.to_string()
     }
+
+    /// The text without its `index`-th `[[effect]]`.
+    pub fn without_effect(&self, index: usize) -> String {
+        let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
+            return self.text.clone();
+        };
+        match document.get_mut("effect") {
+            Some(Item::ArrayOfTables(effects)) if index < effects.len() => effects.remove(index),
+            _ => return self.text.clone(),
+        };
+        document.to_string()
+    }
 }
 
 /// Sets the number at `path` below `item`, keeping what stands around it.
