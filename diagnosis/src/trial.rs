@@ -219,21 +219,20 @@ pub(crate) fn finish(
     holdout: &Holdout<'_>,
     nominal: &Solution,
 ) -> Option<(Judged, Fit)> {
-    for share in SHARP {
-        let Some(candidate) = first.candidate.smoothed(share) else {
-            break;
-        };
+    // The sharpest that can be.
+    let sharp = SHARP.iter().find_map(|share| {
         let sharp = Judged {
-            candidate,
+            candidate: first.candidate.smoothed(*share)?,
             ..first.clone()
         };
-        match fully(sharp, holdout, nominal, WILD) {
-            Some(found) if nrmse(&found.0.rank) < nrmse(&first.rank) => return Some(found),
-            // Less sharp, then.
-            _ => {}
-        }
-    }
-    fully(first, holdout, nominal, f64::INFINITY)
+        fully(sharp, holdout, nominal, WILD)
+    });
+    let broad = fully(first, holdout, nominal, f64::INFINITY);
+    let error = |found: &(Judged, Fit)| nrmse(&found.0.rank);
+    sharp
+        .into_iter()
+        .chain(broad)
+        .min_by(|a, b| error(a).total_cmp(&error(b)))
 }
 
 /// Shares of the flow over which a sign is smoothed in a final fit, which starts near its end: what

@@ -175,12 +175,7 @@ fn an_axis_that_drifts_is_diagnosed() {
         clean.missing
     );
     let rough = told(friction);
-    // Dry friction, alike in both directions or with a level each, which contains the former.
-    let named = rough.missing.unwrap().effect;
-    assert!(
-        ["coulomb_friction", "directional_friction"].contains(&named.as_str()),
-        "{named}"
-    );
+    assert_eq!(rough.missing.unwrap().effect, "coulomb_friction");
 }
 
 /// A pole falls whatever was planned; an axis that drifts can still be driven.
