@@ -445,6 +445,10 @@ pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     if matrix.iter().any(|v| !v.is_finite()) {
         return None;
     }
+    // The decomposition below refuses a matrix without rows or columns; its inverse has none either.
+    if matrix.is_empty() {
+        return Some(matrix.transpose());
+    }
     let largest = matrix.iter().fold(0.0f64, |a, v| a.max(v.abs()));
     matrix
         .clone()

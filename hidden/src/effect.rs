@@ -28,12 +28,25 @@ macro_rules! effects {
                 match self { $(Hidden::$variant => $doc,)* }
             }
 
-            /// The machine on which it is shown.
+            /// The machine of motors and wheels on which it is shown; [`catalogue`] has the others.
             pub fn home(self) -> Robot {
                 match self { $(Hidden::$variant => Robot::$home,)* }
             }
         }
     };
+}
+
+/// What is shown on which machine: every effect at [`Hidden::home`], then what the other machines
+/// hide.
+pub fn catalogue() -> Vec<(Robot, Hidden)> {
+    let homes = Hidden::ALL.iter().map(|effect| (effect.home(), *effect));
+    let rigs = Robot::ALL.into_iter().flat_map(|robot| {
+        robot
+            .rig_effects()
+            .iter()
+            .map(move |effect| (robot, *effect))
+    });
+    homes.chain(rigs).collect()
 }
 
 effects! {

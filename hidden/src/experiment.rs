@@ -2,14 +2,17 @@
 
 use loopsight_core::excitation::{Excitation, Sequence};
 
+use crate::driven::Driven;
 use crate::error::HiddenError;
 use crate::random::Random;
-use crate::robot::Robot;
+use crate::robot::{Kind, Robot};
 
-/// Distance of the samples, s.
+/// Distance of the samples of the machines of motors and wheels, s.
 pub const PERIOD: f64 = 0.01;
-/// Length of every experiment, s.
+/// Length of their experiments, s.
 pub const DURATION: f64 = 25.0;
+/// Largest command, V.
+const FULL: f64 = 9.0;
 /// Samples of an experiment, that at time 0 included.
 pub(crate) const SAMPLES: usize = 2501;
 
@@ -38,13 +41,26 @@ impl Experiment {
         }
     }
 
-    /// The commands from each sample to the next, V.
+    /// The commands from each sample to the next: V, or of a rig in the unit of its command. A rig
+    /// gets those of the axis by the number of the sample, scaled to its own range.
     pub(crate) fn commands(self, robot: Robot, seed: u64) -> Result<Vec<[f64; 2]>, HiddenError> {
+        match robot.kind() {
+            Kind::Driven(driven) => self.voltages(driven, seed),
+            Kind::Rig(sheet) => {
+                let [centre, amplitude] = sheet.command;
+                let scaled = |v: f64| centre + amplitude * v / FULL;
+                let voltages = self.voltages(Driven::Axis, seed)?;
+                Ok(voltages.iter().map(|[v, _]| [scaled(*v), 0.0]).collect())
+            }
+        }
+    }
+
+    fn voltages(self, robot: Driven, seed: u64) -> Result<Vec<[f64; 2]>, HiddenError> {
         let [right, left] = match self {
             Self::Prbs => random(
                 robot,
                 |seed| Excitation::Prbs {
-                    amplitude: 9.0,
+                    amplitude: FULL,
                     hold_s: 0.5,
                     seed,
                     common: false,
@@ -54,7 +70,7 @@ impl Experiment {
             Self::MultiLevel => random(
                 robot,
                 |seed| Excitation::MultiLevel {
-                    amplitude: 9.0,
+                    amplitude: FULL,
                     hold_s: 0.5,
                     levels: 7,
                     seed,
@@ -74,13 +90,13 @@ impl Experiment {
 }
 
 fn random(
-    robot: Robot,
+    robot: Driven,
     make: impl Fn(u64) -> Excitation,
     seed: u64,
 ) -> Result<[Sequence; 2], HiddenError> {
     let names = match robot {
-        Robot::Twil => ["voltage_right", "voltage_left"],
-        Robot::Axis => ["voltage", "none"],
+        Driven::Twil => ["voltage_right", "voltage_left"],
+        Driven::Axis => ["voltage", "none"],
     };
     Ok([make(seed).build(names[0])?, make(seed).build(names[1])?])
 }

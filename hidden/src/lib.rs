@@ -5,7 +5,7 @@
 //! inductance, dry friction that really sticks, gears with teeth, encoders with marks) and share
 //! neither equations nor integrator with the models that are held against them. Without an effect
 //! and without inductance they obey the lumped equations of the paper exactly, by construction:
-//! [`Robot::parts`] says how.
+//! [`Driven::parts`] says how.
 //!
 //! ```
 //! use loopsight_hidden::{Experiment, Hidden, Robot, record};
@@ -22,6 +22,7 @@
 mod amplifier;
 mod contact;
 mod delay;
+mod driven;
 mod effect;
 mod error;
 mod experiment;
@@ -29,6 +30,7 @@ mod friction;
 mod hide;
 mod library;
 mod machine;
+mod machines;
 mod model_file;
 mod motor;
 mod odometry;
@@ -39,11 +41,13 @@ mod refit;
 mod robot;
 mod truth;
 
-pub use effect::Hidden;
+pub use driven::{Body, Driven, Lumped, Motor};
+pub use effect::{Hidden, catalogue};
 pub use error::HiddenError;
 pub use experiment::{DURATION, Experiment, PERIOD};
 pub use library::{visibility, write_library};
+pub use machines::Parts;
 pub use recording::{Recording, nrmse, overall, record, record_along, record_with};
 pub use refit::{Refit, refit};
-pub use robot::{Body, Lumped, Motor, Robot};
+pub use robot::Robot;
 pub use truth::{Concealed, Quantity, Truth};

@@ -5,16 +5,17 @@ use std::path::Path;
 
 use crate::error::HiddenError;
 use crate::truth::Concealed;
-use crate::{Experiment, Hidden, Recording, Robot, nrmse, overall, record, refit};
+use crate::{Experiment, Hidden, Recording, Robot, catalogue, nrmse, overall, record, refit};
 
-/// Seed of the committed PRBS logs; that of the test logs is one more.
+/// Seed of the committed logs to fit to; that of the test logs is one more.
 const SEED: u64 = 1;
 /// The index stands between these lines of the README.
 const BEGIN: &str = "<!-- index: written by the program, changes are lost -->";
 const END: &str = "<!-- end of the index -->";
 
-/// Writes `folder/<id>/{model.toml, prbs.csv, multi_level.csv, truth.toml}` for every effect at
-/// size 1, the same for both clean machines, and the index in `folder/README.md`, whose other text
+/// Writes `folder/<case>/{model.toml, prbs.csv, multi_level.csv, truth.toml}` for every entry of
+/// [`catalogue`] at size 1 (`mixed.csv` where that is [`Robot::lesson`]), the same for both clean
+/// machines of motors and wheels, and the index in `folder/README.md`, whose other text
 /// is kept.
 ///
 /// # Errors
@@ -26,7 +27,7 @@ pub fn write_library(folder: &Path) -> Result<(), HiddenError> {
          |---|---|---|---|---|---|---|---|---|\n",
     );
     for robot in [Robot::Twil, Robot::Axis] {
-        let name = format!("nothing_{}", robot.name());
+        let name = robot.case(None);
         let (log, test) = write_pair(&folder.join(&name), robot, &[])?;
         row(
             &mut index,
@@ -36,15 +37,16 @@ pub fn write_library(folder: &Path) -> Result<(), HiddenError> {
             &test,
         );
     }
-    for effect in Hidden::ALL {
-        let robot = effect.home();
-        let (log, test) = write_pair(&folder.join(effect.id()), robot, &[(*effect, 1.0)])?;
+    for (robot, effect) in catalogue() {
+        let name = robot.case(Some(effect));
+        let (log, test) = write_pair(&folder.join(&name), robot, &[(effect, 1.0)])?;
         let truth = log.truth.hidden.first();
         let at = truth.map_or(String::new(), |h| h.at.join(", "));
         let values = truth.map_or(String::new(), values);
-        let change = percent(visibility(robot, *effect, 1.0, Experiment::Prbs, SEED)?);
-        let words = [robot.name(), effect.doc(), &at, &values, &change];
-        row(&mut index, effect.id(), words, &log, &test);
+        let doc = truth.map_or(effect.doc(), |h| h.doc);
+        let change = percent(visibility(robot, effect, 1.0, robot.lesson(), SEED)?);
+        let words = [robot.name(), doc, &at, &values, &change];
+        row(&mut index, &name, words, &log, &test);
     }
     write_index(&folder.join("README.md"), &index)
 }
@@ -97,20 +99,21 @@ pub fn visibility(
     Ok(overall(&nrmse(&clean.exact, &with.exact)))
 }
 
-/// Writes one folder; returns the PRBS recording and the test.
+/// Writes one folder; returns the recording to fit to and the test.
 fn write_pair(
     folder: &Path,
     robot: Robot,
     effects: &[(Hidden, f64)],
 ) -> Result<(Recording, Recording), HiddenError> {
     fs::create_dir_all(folder).map_err(|e| io(folder, e))?;
-    let prbs = record(robot, effects, Experiment::Prbs, SEED)?;
-    prbs.write_csv(&folder.join("prbs.csv"))?;
+    let lesson = robot.lesson();
+    let log = record(robot, effects, lesson, SEED)?;
+    log.write_csv(&folder.join(format!("{}.csv", lesson.name())))?;
     let test = record(robot, effects, Experiment::MultiLevel, SEED + 1)?;
     test.write_csv(&folder.join("multi_level.csv"))?;
-    write(&folder.join("model.toml"), &prbs.model_toml)?;
-    write(&folder.join("truth.toml"), &prbs.truth.to_toml())?;
-    Ok((prbs, test))
+    write(&folder.join("model.toml"), &log.model_toml)?;
+    write(&folder.join("truth.toml"), &log.truth.to_toml())?;
+    Ok((log, test))
 }
 
 /// Puts the index into the README, or makes one that is nothing else.

@@ -1,10 +1,10 @@
 //! The machine in motion: forces, contacts, and the integrator.
 
 use crate::amplifier::Amplifier;
+use crate::driven::Driven;
 use crate::friction::{Row, solve};
 use crate::motor::Winding;
 use crate::physics::{GRAVITY, Physics};
-use crate::robot::Robot;
 
 /// Integration step, s.
 pub(crate) const STEP: f64 = 1e-4;
@@ -149,8 +149,8 @@ impl Machine {
         let slips = self.physics.tyre.is_some();
         let levers = match (slips, self.physics.robot) {
             (true, _) => [none, none, [0.0, 1.0]],
-            (false, Robot::Twil) => [self.jacobian[0], self.jacobian[1], [0.0, 1.0]],
-            (false, Robot::Axis) => [self.jacobian[0], none, none],
+            (false, Driven::Twil) => [self.jacobian[0], self.jacobian[1], [0.0, 1.0]],
+            (false, Driven::Axis) => [self.jacobian[0], none, none],
         };
         let responses = levers.map(|lever| self.inverse.map(|row| dot(row, lever)));
         let mut compliance = responses.map(|response| levers.map(|l| dot(l, response)));
@@ -230,7 +230,7 @@ impl Machine {
                 let angle = cogging.count * wheel_angle + cogging.phase;
                 torque -= cogging.amplitude * angle.sin();
             }
-            if physics.robot == Robot::Axis {
+            if physics.robot == Driven::Axis {
                 torque += physics.load.torque(wheel_angle);
             }
             if let Some(tyre) = physics.tyre {
@@ -310,7 +310,7 @@ impl Machine {
             self.wheel_angles[k] += STEP * wheel;
             self.rotor_angles[k] += STEP * mean.rotor[k];
         }
-        if self.physics.robot == Robot::Twil {
+        if self.physics.robot == Driven::Twil {
             let [v, omega] = mean.body;
             let (sin, cos) = (self.pose[2] + 0.5 * STEP * omega).sin_cos();
             self.pose[0] += STEP * v * cos;

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use loopsight_hidden::{
-    Experiment, Hidden, HiddenError, Robot, record, record_with, refit, visibility, write_library,
+    Experiment, Hidden, HiddenError, Robot, catalogue, record, record_with, refit, visibility,
+    write_library,
 };
 
 const USAGE: &str = "usage:
   loopsight-hidden all -o FOLDER      write every effect's recordings and the index
   loopsight-hidden table              print how much each effect changes the signals
-  loopsight-hidden one EFFECT[=SIZE][+EFFECT[=SIZE]] prbs|multi_level|mixed SEED -o FILE.csv";
+  loopsight-hidden one [ROBOT:]EFFECT[=SIZE][+EFFECT[=SIZE]] prbs|multi_level|mixed SEED -o FILE.csv";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -45,11 +46,13 @@ fn misused() -> ExitCode {
 
 fn one(effects: &str, experiment: Experiment, seed: u64, file: &str) -> Result<(), HiddenError> {
     let mut hidden = Vec::new();
+    let (name, effects) = effects.split_once(':').unwrap_or(("", effects));
     for entry in effects.split('+') {
         let (id, size) = entry.split_once('=').unwrap_or((entry, "1"));
         hidden.push((id.parse::<Hidden>()?, size.parse().unwrap_or(f64::NAN)));
     }
-    let robot = hidden[0].0.home();
+    let named = Robot::ALL.into_iter().find(|r| r.name() == name);
+    let robot = named.unwrap_or_else(|| hidden[0].0.home());
     let recording = record(robot, &hidden, experiment, seed)?;
     print!("{}", recording.truth.to_toml());
     recording.write_csv(&PathBuf::from(file))
@@ -58,7 +61,8 @@ fn one(effects: &str, experiment: Experiment, seed: u64, file: &str) -> Result<(
 /// Effects by size and experiment: the change, and what is left of it after a refit to PRBS.
 fn table() -> Result<(), HiddenError> {
     println!(
-        "in % of the signals' standard deviation; the refit is to the log of the first column"
+        "in % of the signals' standard deviation; the refit is to the log of the first column, of the \
+         last one where the robot is part of the name"
     );
     for robot in [Robot::Twil, Robot::Axis] {
         for winding in [1e-3, 1e-4] {
@@ -73,32 +77,31 @@ fn table() -> Result<(), HiddenError> {
         }
     }
     println!(
-        "{:24} {:>5} | {:^23} | {:^23} | {:>5}",
+        "{:32} {:>5} | {:^23} | {:^23} | {:>5}",
         "", "", "change", "left after refit", ""
     );
     let head = ["prbs", "levels", "mixed"]
         .map(|h| format!("{h:>7}"))
         .join(" ");
     println!(
-        "{:24} {:>5} | {head} | {head} | {:>5}",
+        "{:32} {:>5} | {head} | {head} | {:>5}",
         "effect", "size", "floor"
     );
-    for effect in Hidden::ALL {
+    for (robot, effect) in catalogue() {
         for size in [0.5, 1.0, 2.0] {
-            let robot = effect.home();
             let mut change = String::new();
             let mut left = String::new();
-            let log = record(robot, &[(*effect, size)], Experiment::Prbs, 1)?;
+            let log = record(robot, &[(effect, size)], robot.lesson(), 1)?;
             let fit = refit(&log);
             for experiment in Experiment::ALL {
-                let share = visibility(robot, *effect, size, experiment, 1)?;
+                let share = visibility(robot, effect, size, experiment, 1)?;
                 change.push_str(&format!(" {:7.2}", 100.0 * share));
-                let test = record(robot, &[(*effect, size)], experiment, 1)?;
+                let test = record(robot, &[(effect, size)], experiment, 1)?;
                 left.push_str(&format!(" {:7.2}", 100.0 * fit.left(&test)));
             }
             println!(
-                "{:24} {size:5} |{change} |{left} | {:5.2}",
-                effect.id(),
+                "{:32} {size:5} |{change} |{left} | {:5.2}",
+                robot.case(Some(effect)),
                 100.0 * log.floor()
             );
         }

@@ -1,9 +1,9 @@
 //! The model to start from: what one would write down of the machine without suspecting anything.
 
+use crate::driven::Driven;
 use crate::odometry::COUNTS;
-use crate::robot::Robot;
 
-impl Robot {
+impl Driven {
     /// A model file for `loopsight`: the true lumped parameters, rounded, as a first guess, and the
     /// true sensor.
     pub fn model_toml(self) -> String {
@@ -11,7 +11,7 @@ impl Robot {
         let body = self.parts().1;
         let (r, b) = (body.wheel_radius, body.half_track);
         match self {
-            Robot::Twil => format!(
+            Driven::Twil => format!(
                 "# A robot like the Twil. Its recordings may hide an effect that this model lacks.\n\
                  name = \"Twil with a secret\"\n\
                  \n\
@@ -47,7 +47,7 @@ impl Robot {
                 half = r / 2.0,
                 yaw = r / (2.0 * b),
             ),
-            Robot::Axis => format!(
+            Driven::Axis => format!(
                 "# An axis with one motor. Its recordings may hide an effect that this model lacks.\n\
                  name = \"Axis with a secret\"\n\
                  \n\

@@ -1,6 +1,6 @@
 //! Windings, their heat, and the battery they share.
 
-use crate::robot::Motor;
+use crate::driven::Motor;
 
 /// The winding of one motor: its current and its temperature.
 ///
@@ -123,11 +123,11 @@ impl Battery {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Robot;
+    use crate::Driven;
 
     #[test]
     fn a_stalled_winding_follows_its_exponential() {
-        let motor = Robot::Twil.parts().0;
+        let motor = Driven::Twil.parts().0;
         let time_constant = motor.inductance / motor.resistance;
         let mut winding = Winding::new(motor, None, 1e-4);
         for k in 1..=50 {
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn heat_is_what_the_current_loses() {
-        let motor = Robot::Twil.parts().0;
+        let motor = Driven::Twil.parts().0;
         let heat = Heat {
             capacity: 2.0,
             resistance: 10.0,

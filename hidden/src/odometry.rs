@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::delay::Delay;
-use crate::robot::{Body, Robot};
+use crate::driven::{Body, Driven};
 
 /// Counts per revolution after quadrature.
 pub(crate) const COUNTS: f64 = 8192.0;
@@ -49,14 +49,14 @@ pub(crate) struct OdometryParts {
 
 impl OdometryParts {
     /// Odometry without fault.
-    pub(crate) fn new(robot: Robot, body: &Body) -> Self {
+    pub(crate) fn new(robot: Driven, body: &Body) -> Self {
         let r = body.wheel_radius;
         let (signals, gain) = match robot {
-            Robot::Twil => {
+            Driven::Twil => {
                 let yaw = r / (2.0 * body.half_track);
                 (2, [[r / 2.0, r / 2.0], [yaw, -yaw]])
             }
-            Robot::Axis => (1, [[1.0, 0.0], [0.0, 0.0]]),
+            Driven::Axis => (1, [[1.0, 0.0], [0.0, 0.0]]),
         };
         Self {
             signals,
@@ -175,7 +175,7 @@ mod tests {
     use super::*;
 
     fn parts() -> OdometryParts {
-        OdometryParts::new(Robot::Twil, &Robot::Twil.parts().1)
+        OdometryParts::new(Driven::Twil, &Driven::Twil.parts().1)
     }
 
     #[test]

@@ -2,10 +2,10 @@
 
 use crate::amplifier::AmplifierParts;
 use crate::contact::{Gap, Tyre};
+use crate::driven::{Body, Driven, Motor};
 use crate::friction::Friction;
 use crate::motor::{Battery, Heat};
 use crate::odometry::OdometryParts;
-use crate::robot::{Body, Motor, Robot};
 
 /// Acceleration of gravity, m/s².
 pub(crate) const GRAVITY: f64 = 9.81;
@@ -70,7 +70,7 @@ pub(crate) struct Payload {
 /// A machine, completely described.
 #[derive(Clone, Debug)]
 pub(crate) struct Physics {
-    pub(crate) robot: Robot,
+    pub(crate) robot: Driven,
     pub(crate) motor: Motor,
     pub(crate) body: Body,
     pub(crate) amplifiers: [AmplifierParts; 2],
@@ -93,7 +93,7 @@ pub(crate) struct Physics {
 
 impl Physics {
     /// The machine without any hidden effect.
-    pub(crate) fn clean(robot: Robot) -> Self {
+    pub(crate) fn clean(robot: Driven) -> Self {
         let (motor, body) = robot.parts();
         Self {
             robot,
@@ -124,8 +124,8 @@ impl Physics {
         let r = self.body.wheel_radius;
         let b = self.body.half_track;
         match self.robot {
-            Robot::Twil => [[1.0 / r, b / r], [1.0 / r, -b / r]],
-            Robot::Axis => [[1.0, 0.0], [0.0, 0.0]],
+            Driven::Twil => [[1.0 / r, b / r], [1.0 / r, -b / r]],
+            Driven::Axis => [[1.0, 0.0], [0.0, 0.0]],
         }
     }
 }

@@ -5,22 +5,24 @@ use std::path::Path;
 use loopsight_core::run::Run;
 use loopsight_recordings::write_csv;
 
+use crate::driven::{Driven, ELECTRICAL_TIME_CONSTANT};
 use crate::error::HiddenError;
 use crate::experiment::{Experiment, PERIOD};
 use crate::hide::hide;
 use crate::machine::{Machine, STEP};
+use crate::machines::along_rig;
 use crate::motor::COPPER;
 use crate::odometry::Odometry;
 use crate::physics::Physics;
 use crate::random::Random;
-use crate::robot::ELECTRICAL_TIME_CONSTANT;
+use crate::robot::Kind;
 use crate::truth::{Concealed, Quantity, Truth, significant};
 use crate::{Hidden, Robot};
 
 /// A log of a machine that hides something, and what it hides.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// What is logged: commands in V, velocities from encoder counts in SI units.
+    /// What is logged: commands or what a controller made of them, and readings, in SI units.
     pub run: Run,
     /// The same motion through the same sensors, but for the rounding to counts: no model can be
     /// closer to [`Recording::run`] than this is.
@@ -29,6 +31,8 @@ pub struct Recording {
     pub truth: Truth,
     /// A model file without the effect.
     pub model_toml: String,
+    /// What the machine was told.
+    pub(crate) commands: Vec<[f64; 2]>,
 }
 
 /// Integration steps from sample to sample.
@@ -80,7 +84,8 @@ pub fn record_with(
 }
 
 /// [`record_with`] along commands of one's own, V, one row per sampling period: a planned
-/// experiment. On a machine with one motor the second of a row is not used.
+/// experiment. On a machine with one command the second of a row is not used, and the first is in the
+/// unit of that command.
 ///
 /// # Errors
 ///
@@ -92,8 +97,30 @@ pub fn record_along(
     seed: u64,
     winding_time_constant: f64,
 ) -> Result<Recording, HiddenError> {
+    match robot.kind() {
+        Kind::Driven(driven) => along_driven(
+            driven,
+            robot,
+            effects,
+            commands,
+            seed,
+            winding_time_constant,
+        ),
+        Kind::Rig(sheet) => along_rig(sheet, robot, effects, commands, seed, winding_time_constant),
+    }
+}
+
+/// A machine of shafts along commands.
+fn along_driven(
+    driven: Driven,
+    robot: Robot,
+    effects: &[(Hidden, f64)],
+    commands: &[[f64; 2]],
+    seed: u64,
+    winding_time_constant: f64,
+) -> Result<Recording, HiddenError> {
     let samples = commands.len();
-    let mut physics = Physics::clean(robot);
+    let mut physics = Physics::clean(driven);
     // The windings' formulas have no zero to divide by below a nanosecond.
     physics.motor.inductance = winding_time_constant.max(1e-9) * physics.motor.resistance;
     let mut hidden = effects
@@ -104,7 +131,7 @@ pub fn record_along(
     let phase = [random.uniform(), random.uniform()];
     let mut odometry = Odometry::new(physics.odometry, phase, STEP);
     let signals = physics.odometry.signals;
-    let drives = robot.drives();
+    let drives = driven.drives();
     let mut machine = Machine::new(physics);
 
     let mut run = Run {
@@ -148,30 +175,12 @@ pub fn record_along(
         truth: Truth {
             robot,
             hidden,
-            lumped: lumped(robot),
-            winding_time_constant,
+            lumped: driven.quantities(),
+            winding_time_constant: Some(winding_time_constant),
         },
-        model_toml: robot.model_toml(),
+        model_toml: driven.model_toml(),
+        commands: commands.to_vec(),
     })
-}
-
-fn lumped(robot: Robot) -> Vec<Quantity> {
-    let k = robot.lumped();
-    let quantity = |name, value, unit| Quantity { name, value, unit };
-    match robot {
-        Robot::Twil => vec![
-            quantity("K_A", k.k_a, "1/s"),
-            quantity("K_B", 0.0, "m/rad^2"),
-            quantity("K_C", k.k_c, "m/s^2/V"),
-            quantity("K_D", k.k_d, "1/s"),
-            quantity("K_E", 0.0, "1/m"),
-            quantity("K_F", k.k_f, "rad/s^2/V"),
-        ],
-        Robot::Axis => vec![
-            quantity("K_A", k.k_a, "1/s"),
-            quantity("K_C", k.k_c, "rad/s^2/V"),
-        ],
-    }
 }
 
 /// Root mean square of the difference of two runs over the standard deviation of the first,
@@ -201,16 +210,7 @@ impl Recording {
 
     /// Header of the log.
     pub fn columns(&self) -> Vec<String> {
-        let names: &[&str] = match self.truth.robot {
-            Robot::Twil => &[
-                "time_s",
-                "voltage_right_V",
-                "voltage_left_V",
-                "linear_velocity_m_per_s",
-                "angular_velocity_rad_per_s",
-            ],
-            Robot::Axis => &["time_s", "voltage_V", "speed_rad_per_s"],
-        };
+        let names = self.truth.robot.columns();
         names.iter().map(|n| (*n).to_owned()).collect()
     }
 

@@ -1,21 +1,28 @@
 //! How much of an effect the nominal model can take up in its own parameters.
 
+use crate::machines::{self, Parts};
 use crate::recording::{Recording, overall};
-use crate::robot::Robot;
+use crate::robot::{Kind, Robot};
 
-/// The lumped model without K_B and K_E, fitted to a recording: one first-order lag per signal.
+/// The model without effect, fitted to a recording.
+///
+/// Of the machines of motors and wheels it is the lumped model without K_B and K_E, one first-order
+/// lag per signal
 ///
 /// ```text
 /// y' = a y + c s      s = V_r + V_l for the forward speed, V_r - V_l for the yaw rate
 /// ```
 ///
 /// compared as the mean over each period, from rest, with the squared error of the free run made
-/// least. For each `a` the best `c` is linear; `a` is found by golden section. It answers how large
-/// the error is that only another model can take away.
+/// least. For each `a` the best `c` is linear; `a` is found by golden section. Of the others it is
+/// the machine itself without effect, its parts fitted by Gauss and Newton's method to what it does
+/// under the same commands. It answers how large the error is that only another model can take away.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Refit {
+pub enum Refit {
     /// `[K_A, K_C]`, and `[K_D, K_F]` on the robot.
-    pub parameters: Vec<[f64; 2]>,
+    Lags(Vec<[f64; 2]>),
+    /// Each part over its true value.
+    Parts(Parts),
 }
 
 /// Least and largest damping considered, 1/s.
@@ -23,6 +30,9 @@ const DAMPING: [f64; 2] = [0.05, 300.0];
 
 /// Fits the lumped model to `log`.
 pub fn refit(log: &Recording) -> Refit {
+    if let Kind::Rig(sheet) = log.truth.robot.kind() {
+        return Refit::Parts(machines::refit(sheet, log));
+    }
     let parameters = (0..log.run.n_measured)
         .map(|signal| {
             let gain_and_error = |damping: f64| {
@@ -40,16 +50,21 @@ pub fn refit(log: &Recording) -> Refit {
             [-damping, gain_and_error(damping).0]
         })
         .collect();
-    Refit { parameters }
+    Refit::Lags(parameters)
 }
 
 impl Refit {
     /// Error of the fitted model's free run on `log`, over the standard deviation of the signal,
     /// root mean square over the signals.
     pub fn left(&self, log: &Recording) -> f64 {
+        let lags = match (self, log.truth.robot.kind()) {
+            (Refit::Lags(lags), _) => lags,
+            (Refit::Parts(parts), Kind::Rig(sheet)) => return machines::left(sheet, parts, log),
+            // Parts of another machine explain nothing.
+            (Refit::Parts(_), Kind::Driven(_)) => return f64::NAN,
+        };
         let n = log.run.len() as f64;
-        let shares: Vec<f64> = self
-            .parameters
+        let shares: Vec<f64> = lags
             .iter()
             .enumerate()
             .map(|(signal, [a, c])| {
@@ -82,9 +97,9 @@ fn response(log: &Recording, signal: usize, damping: f64) -> Vec<f64> {
             let out = mean;
             let u = run.input(k);
             let s = match (log.truth.robot, signal) {
-                (Robot::Axis, _) => u[0],
                 (Robot::Twil, 0) => u[0] + u[1],
                 (Robot::Twil, _) => u[0] - u[1],
+                _ => u[0],
             };
             let h = match run.time.get(k + 1) {
                 Some(next) => next - run.time[k],
@@ -121,18 +136,22 @@ fn golden([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::driven::Driven;
     use crate::{Experiment, record};
 
     /// The clean machine is a lumped model of the paper's parameters, but for the millisecond of its
     /// windings, and nothing but the rounding is left.
     #[test]
     fn a_clean_machine_is_found_as_it_is() {
-        for robot in [Robot::Twil, Robot::Axis] {
+        for (robot, driven) in [(Robot::Twil, Driven::Twil), (Robot::Axis, Driven::Axis)] {
             let log = record(robot, &[], Experiment::Prbs, 1).unwrap();
             let fit = refit(&log);
-            let k = robot.lumped();
+            let k = driven.lumped();
+            let Refit::Lags(lags) = &fit else {
+                panic!("{robot:?} has lags");
+            };
             let expected = [[k.k_a, k.k_c], [k.k_d, k.k_f]];
-            for (found, expected) in fit.parameters.iter().zip(expected) {
+            for (found, expected) in lags.iter().zip(expected) {
                 for (found, expected) in found.iter().zip(expected) {
                     assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
                 }

@@ -18,6 +18,8 @@ pub struct Quantity {
 pub struct Concealed {
     /// Which.
     pub effect: Hidden,
+    /// One line: what is hidden.
+    pub doc: &'static str,
     /// Size it was hidden with; 1 is noticeable, twice that hard to miss.
     pub size: f64,
     /// Channels of the fitted plant at which it sits.
@@ -37,12 +39,20 @@ impl Concealed {
     pub(crate) fn new(effect: Hidden, size: f64, at: &[&'static str]) -> Self {
         Self {
             effect,
+            doc: effect.doc(),
             size,
             at: at.to_vec(),
             fitted: Vec::new(),
             approximate: false,
             physical: Vec::new(),
         }
+    }
+
+    /// What it is on this machine, and the channels of its plant at which it sits.
+    pub(crate) fn told(mut self, doc: &'static str, at: &[&'static str]) -> Self {
+        self.doc = doc;
+        self.at = at.to_vec();
+        self
     }
 
     pub(crate) fn fitted(mut self, name: &'static str, value: f64, unit: &'static str) -> Self {
@@ -69,10 +79,11 @@ pub struct Truth {
     pub robot: Robot,
     /// What was hidden, in the order asked for; empty on the clean machine.
     pub hidden: Vec<Concealed>,
-    /// True lumped parameters by name, with units, those of a machine without the effect.
+    /// True parameters of the model by name, with units, those of a machine without the effect.
     pub lumped: Vec<Quantity>,
-    /// Time constant of the windings, s: to a lumped model an actuator lag.
-    pub winding_time_constant: f64,
+    /// Time constant of the windings, s: to a lumped model an actuator lag. None without a motor on
+    /// a voltage.
+    pub winding_time_constant: Option<f64>,
 }
 
 impl Truth {
@@ -80,16 +91,17 @@ impl Truth {
     pub fn to_toml(&self) -> String {
         let mut text = format!("robot = \"{}\"\n\n[lumped]\n", self.robot.name());
         quantities(&mut text, &self.lumped);
-        text.push_str(&format!(
-            "\n# The windings' inductance, which the lumped model does not have.\n\
-             [winding]\ntime_constant = {:?} # s\n",
-            self.winding_time_constant
-        ));
+        if let Some(time_constant) = self.winding_time_constant {
+            text.push_str(&format!(
+                "\n# The windings' inductance, which the lumped model does not have.\n\
+                 [winding]\ntime_constant = {time_constant:?} # s\n"
+            ));
+        }
         for hidden in &self.hidden {
             let at: Vec<String> = hidden.at.iter().map(|c| format!("\"{c}\"")).collect();
             text.push_str(&format!(
                 "\n# {}\n[[hidden]]\neffect = \"{}\"\nsize = {:?}\nat = [{}]\n",
-                hidden.effect.doc(),
+                hidden.doc,
                 hidden.effect,
                 hidden.size,
                 at.join(", ")

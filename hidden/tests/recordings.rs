@@ -9,7 +9,9 @@ use std::path::Path;
 
 use loopsight_core::Plant;
 use loopsight_core::model::Model;
-use loopsight_hidden::{Experiment, Hidden, Recording, Robot, nrmse, overall, record, visibility};
+use loopsight_hidden::{
+    Driven, Experiment, Hidden, Recording, Robot, nrmse, overall, record, visibility,
+};
 use loopsight_plants::Ddmr;
 
 fn make(effects: &[(Hidden, f64)], experiment: Experiment, seed: u64) -> Recording {
@@ -20,7 +22,7 @@ fn make(effects: &[(Hidden, f64)], experiment: Experiment, seed: u64) -> Recordi
 /// The parts give the paper's parameters by the paper's formulas, too.
 #[test]
 fn the_parts_are_those_of_the_paper() {
-    let (motor, body) = Robot::Twil.parts();
+    let (motor, body) = Driven::Twil.parts();
     let n = motor.gear_ratio;
     let rolling = body.wheel_inertia / body.wheel_radius.powi(2);
     // Wheels that roll are mass to the body, and inertia at their distance from its middle.

@@ -1,7 +1,10 @@
 //! The blind table: recordings that hide an effect, and what a diagnosis finds in them.
 //!
 //! `cargo run --release -p loopsight-tests --example blind_table -- [--sizes 0.5,1,2]
-//! [--experiments prbs,mixed] [--seeds 2] [--first 11] [--clean 20] [--only coulomb_friction] [--write FILE]`
+//! [--experiments prbs,mixed] [--seeds 2] [--first 11] [--clean 20] [--only coulomb_friction,arm,tank_pair_dead_zone] [--write FILE]`
+//!
+//! `--only` takes effects, machines, and recordings by the name of their folder in
+//! `examples/hidden-effect`.
 //!
 //! Judged on a multi-level recording of the same machine with other seeds. The machine's windings
 //! have a time constant of 0.1 ms, far below what can be seen; everything else about it is
@@ -11,7 +14,7 @@ use std::fmt::Write as _;
 
 use loopsight_core::model::Model;
 use loopsight_diagnosis::{Conclusion, Diagnosis, diagnose};
-use loopsight_hidden::{Experiment, Hidden, Robot, record_with, refit};
+use loopsight_hidden::{Experiment, Hidden, Robot, catalogue, record_with, refit};
 use loopsight_plants as _;
 use rayon::prelude::*;
 
@@ -78,15 +81,17 @@ fn main() {
     let clean: u64 = value("--clean", "20").parse().unwrap_or(20);
     let only = value("--only", "");
 
-    let mut jobs: Vec<(Option<Hidden>, Experiment, f64, u64)> = Vec::new();
-    for effect in Hidden::ALL {
-        if !only.is_empty() && !only.split(',').any(|o| o == effect.id()) {
+    let mut jobs: Vec<(Robot, Option<Hidden>, Experiment, f64, u64)> = Vec::new();
+    for (robot, effect) in catalogue() {
+        let case = robot.case(Some(effect));
+        let meant = |name: &str| name == case || name == effect.id() || name == robot.name();
+        if !only.is_empty() && !only.split(',').any(meant) {
             continue;
         }
         for experiment in &experiments {
             for size in &sizes {
                 for seed in first..first + seeds {
-                    jobs.push((Some(*effect), *experiment, *size, seed));
+                    jobs.push((robot, Some(effect), *experiment, *size, seed));
                 }
             }
         }
@@ -94,15 +99,15 @@ fn main() {
     if only.is_empty() {
         for seed in 0..clean {
             let experiment = experiments[seed as usize % experiments.len()];
-            jobs.push((None, experiment, 0.0, 100 * first + seed));
+            jobs.push((Robot::Twil, None, experiment, 0.0, 100 * first + seed));
         }
     }
     let rows: Vec<Row> = jobs
         .par_iter()
-        .filter_map(|(effect, experiment, size, seed)| {
-            let row = try_one(*effect, *experiment, *size, *seed)?;
+        .filter_map(|(robot, effect, experiment, size, seed)| {
+            let row = try_one(*robot, *effect, *experiment, *size, *seed)?;
             eprintln!(
-                "{} {:22} {:6} size {:3} seed {:3}: {:60} {:6.2} -> {:6.2} floor {:5.2} {}",
+                "{} {:30} {:6} size {:3} seed {:3}: {:60} {:6.2} -> {:6.2} floor {:5.2} {}",
                 if row.right { "ok   " } else { "WRONG" },
                 row.what,
                 row.experiment.name(),
@@ -132,8 +137,13 @@ fn main() {
     }
 }
 
-fn try_one(effect: Option<Hidden>, experiment: Experiment, size: f64, seed: u64) -> Option<Row> {
-    let robot = effect.map_or(Robot::Twil, Hidden::home);
+fn try_one(
+    robot: Robot,
+    effect: Option<Hidden>,
+    experiment: Experiment,
+    size: f64,
+    seed: u64,
+) -> Option<Row> {
     let hidden: Vec<(Hidden, f64)> = effect.map(|e| (e, size)).into_iter().collect();
     let log = record_with(robot, &hidden, experiment, seed, WINDINGS).ok()?;
     let test = record_with(
@@ -149,7 +159,7 @@ fn try_one(effect: Option<Hidden>, experiment: Experiment, size: f64, seed: u64)
     let tests = [test.run.clone()];
     let diagnosis = diagnose(&model, &runs, Some(&tests), &[], &|_, _| {}).ok()?;
     let hidden_well = effect.is_some() && refit(&log).left(&log) < INVISIBLE * log.floor();
-    let what = effect.map_or("clean", Hidden::id);
+    let what = effect.map_or_else(|| "clean".to_owned(), |e| robot.case(Some(e)));
     let truth = log.truth.hidden.first();
     let right = match truth {
         None => diagnosis.verdict == Conclusion::NothingMissing,
@@ -203,7 +213,7 @@ fn try_one(effect: Option<Hidden>, experiment: Experiment, size: f64, seed: u64)
         _ => Vec::new(),
     };
     Some(Row {
-        what: what.to_owned(),
+        what,
         experiment,
         size,
         seed,

@@ -13,7 +13,7 @@ use loopsight_core::run::Run;
 use loopsight_diagnosis::{
     Conclusion, Diagnosis, FitSettings, ResidualForce, diagnose, fit, residual_force,
 };
-use loopsight_hidden::Robot;
+use loopsight_hidden::Driven as Robot;
 use loopsight_plants as _;
 
 const PERIOD: f64 = 0.01;

@@ -1,8 +1,8 @@
 //! Effects at the body: ground, centre of mass, payload.
 
 use crate::contact::Tyre;
+use crate::driven::Driven;
 use crate::physics::{GRAVITY, Payload, Physics, Slope};
-use crate::robot::Robot;
 use crate::truth::Concealed;
 
 /// Mass and yaw inertia with rotors and wheels that roll, kg and kg m²; on the axis the inertia of
@@ -10,8 +10,8 @@ use crate::truth::Concealed;
 fn effective(m: &Physics) -> [f64; 2] {
     let turning = m.motor.reflected_inertia + m.body.wheel_inertia;
     match m.robot {
-        Robot::Axis => [m.body.mass + turning; 2],
-        Robot::Twil => {
+        Driven::Axis => [m.body.mass + turning; 2],
+        Driven::Twil => {
             let per_wheel = 2.0 * turning / m.body.wheel_radius.powi(2);
             let lever = m.body.half_track.powi(2);
             [m.body.mass + per_wheel, m.body.inertia + per_wheel * lever]
@@ -80,13 +80,13 @@ pub(super) fn payload(m: &mut Physics, mut of: Concealed) -> Concealed {
     let payload = Payload {
         time: 9.7,
         mass: match m.robot {
-            Robot::Twil => 0.24 * mass * of.size,
-            Robot::Axis => 0.4 * mass * of.size,
+            Driven::Twil => 0.24 * mass * of.size,
+            Driven::Axis => 0.4 * mass * of.size,
         },
         inertia: 0.2 * inertia * of.size,
     };
     m.payload = Some(payload);
-    let of_robot = m.robot == Robot::Twil;
+    let of_robot = m.robot == Driven::Twil;
     of.at = if of_robot {
         vec!["inertia.forward", "inertia.yaw"]
     } else {

@@ -2,8 +2,8 @@
 //! drive the machine, 0.9 V is 10 %.
 
 use crate::contact::Gap;
+use crate::driven::Driven;
 use crate::physics::{Cogging, Physics};
-use crate::robot::Robot;
 use crate::truth::Concealed;
 
 /// Adds to each of two coefficients.
@@ -112,8 +112,8 @@ pub(super) fn backlash(m: &mut Physics, mut of: Concealed) -> Concealed {
     of.approximate = true;
     let k = m.robot.lumped();
     let back_emf = match m.robot {
-        Robot::Twil => -k.k_a * m.body.wheel_radius / (2.0 * k.k_c),
-        Robot::Axis => -k.k_a / k.k_c,
+        Driven::Twil => -k.k_a * m.body.wheel_radius / (2.0 * k.k_c),
+        Driven::Axis => -k.k_a / k.k_c,
     };
     of.fitted("play", gap.gap * back_emf, "V s")
         .physical("gap", gap.gap, "rad")

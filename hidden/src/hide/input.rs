@@ -1,15 +1,15 @@
 //! Effects between command and motor torque: amplifiers, battery, windings.
 
 use crate::amplifier::AmplifierParts;
+use crate::driven::Driven;
 use crate::motor::{COPPER, Heat};
 use crate::physics::Physics;
-use crate::robot::Robot;
 use crate::truth::Concealed;
 
 fn at_inputs(m: &mut Physics, of: &mut Concealed) {
     of.at = match m.robot {
-        Robot::Twil => vec!["input.right", "input.left"],
-        Robot::Axis => vec!["input"],
+        Driven::Twil => vec!["input.right", "input.left"],
+        Driven::Axis => vec!["input"],
     };
 }
 

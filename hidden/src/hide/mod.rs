@@ -5,9 +5,9 @@ mod effort;
 mod input;
 mod output;
 
+use crate::driven::Driven;
 use crate::error::HiddenError;
 use crate::physics::Physics;
-use crate::robot::Robot;
 use crate::truth::Concealed;
 use crate::{Hidden, Hidden as H};
 
@@ -20,14 +20,7 @@ pub(crate) fn hide(
     effect: Hidden,
     size: f64,
 ) -> Result<Concealed, HiddenError> {
-    let largest = largest(effect);
-    if !(size > 0.0 && size <= largest) {
-        return Err(HiddenError::Size {
-            effect,
-            size,
-            largest,
-        });
-    }
+    check(effect, size)?;
     if !fits(effect, machine.robot) {
         return Err(HiddenError::NotHere {
             effect,
@@ -35,8 +28,8 @@ pub(crate) fn hide(
         });
     }
     let shafts = match machine.robot {
-        Robot::Twil => WHEELS,
-        Robot::Axis => SHAFT,
+        Driven::Twil => WHEELS,
+        Driven::Axis => SHAFT,
     };
     let concealed = Concealed::new(effect, size, shafts);
     Ok(match effect {
@@ -73,6 +66,19 @@ pub(crate) fn hide(
     })
 }
 
+/// Whether a size makes sense.
+pub(crate) fn check(effect: Hidden, size: f64) -> Result<(), HiddenError> {
+    let largest = largest(effect);
+    if size > 0.0 && size <= largest {
+        return Ok(());
+    }
+    Err(HiddenError::Size {
+        effect,
+        size,
+        largest,
+    })
+}
+
 /// Above this size the formula of the effect makes no sense.
 fn largest(effect: Hidden) -> f64 {
     match effect {
@@ -84,17 +90,17 @@ fn largest(effect: Hidden) -> f64 {
     }
 }
 
-fn fits(effect: Hidden, robot: Robot) -> bool {
+fn fits(effect: Hidden, robot: Driven) -> bool {
     match effect {
         H::ConstantForce | H::GravityPendulum | H::LinearStiffness | H::CubicStiffness => {
-            robot == Robot::Axis
+            robot == Driven::Axis
         }
         H::ScrubFriction
         | H::GravitySlope
         | H::CentrifugalOffset
         | H::WheelSlip
         | H::GainAsymmetry
-        | H::WheelRadiusMismatch => robot == Robot::Twil,
+        | H::WheelRadiusMismatch => robot == Driven::Twil,
         _ => true,
     }
 }

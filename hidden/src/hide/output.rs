@@ -1,14 +1,14 @@
 //! Effects between the motion and the number in the log.
 
+use crate::driven::Driven;
 use crate::odometry::Eccentricity;
 use crate::physics::Physics;
-use crate::robot::Robot;
 use crate::truth::Concealed;
 
 fn at_sensors(m: &Physics, of: &mut Concealed) {
     of.at = match m.robot {
-        Robot::Twil => vec!["sensor.linear_velocity", "sensor.angular_velocity"],
-        Robot::Axis => vec!["sensor.speed"],
+        Driven::Twil => vec!["sensor.linear_velocity", "sensor.angular_velocity"],
+        Driven::Axis => vec!["sensor.speed"],
     };
 }
 
@@ -32,8 +32,8 @@ pub(super) fn lag(m: &mut Physics, mut of: Concealed) -> Concealed {
 pub(super) fn offset(m: &mut Physics, mut of: Concealed) -> Concealed {
     at_sensors(m, &mut of);
     let (signal, offset) = match m.robot {
-        Robot::Twil => (1, 0.1 * of.size),
-        Robot::Axis => (0, 0.25 * of.size),
+        Driven::Twil => (1, 0.1 * of.size),
+        Driven::Axis => (0, 0.25 * of.size),
     };
     of.at = vec![of.at[signal]];
     m.odometry.offset[signal] += offset;
@@ -68,8 +68,8 @@ pub(super) fn ripple(m: &mut Physics, mut of: Concealed) -> Concealed {
     let (amplitude, phase) = (0.08 * of.size, 0.7f64);
     m.odometry.eccentricity[0] = Eccentricity { amplitude, phase };
     of.at = match m.robot {
-        Robot::Twil => vec!["encoder.right"],
-        Robot::Axis => vec!["sensor.angle"],
+        Driven::Twil => vec!["encoder.right"],
+        Driven::Axis => vec!["sensor.angle"],
     };
     of.fitted("sine", amplitude * phase.cos(), "rad").fitted(
         "cosine",

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::Hidden;
+use crate::driven::Driven;
 use crate::hide::hide;
-use crate::robot::Robot;
 
 /// Inductance gone: `L/R` of ten nanoseconds.
 fn stiff(mut physics: Physics) -> Physics {
@@ -11,7 +11,7 @@ fn stiff(mut physics: Physics) -> Physics {
     physics
 }
 
-fn with(robot: Robot, effect: Hidden, size: f64) -> Physics {
+fn with(robot: Driven, effect: Hidden, size: f64) -> Physics {
     let mut physics = Physics::clean(robot);
     hide(&mut physics, effect, size).unwrap();
     physics
@@ -35,24 +35,24 @@ fn run(physics: Physics, seconds: f64, mut look: impl FnMut(f64, &Machine)) -> M
 }
 
 /// The exact solution of the lumped equations between two changes of the command.
-fn lumped_step(robot: Robot, u: [f64; 2], volts: [f64; 2], h: f64) -> [f64; 2] {
+fn lumped_step(robot: Driven, u: [f64; 2], volts: [f64; 2], h: f64) -> [f64; 2] {
     let k = robot.lumped();
     let go = |u: f64, damping: f64, push: f64| {
         let settled = -push / damping;
         settled + (u - settled) * (damping * h).exp()
     };
     match robot {
-        Robot::Twil => [
+        Driven::Twil => [
             go(u[0], k.k_a, k.k_c * (volts[0] + volts[1])),
             go(u[1], k.k_d, k.k_f * (volts[0] - volts[1])),
         ],
-        Robot::Axis => [go(u[0], k.k_a, k.k_c * volts[0]), 0.0],
+        Driven::Axis => [go(u[0], k.k_a, k.k_c * volts[0]), 0.0],
     }
 }
 
 #[test]
 fn without_effect_and_inductance_the_lumped_equations_hold() {
-    for robot in [Robot::Twil, Robot::Axis] {
+    for robot in [Driven::Twil, Driven::Axis] {
         let mut u = [0.0; 2];
         let mut worst = 0.0f64;
         run(stiff(Physics::clean(robot)), 5.0, |t, machine| {
@@ -68,11 +68,11 @@ fn without_effect_and_inductance_the_lumped_equations_hold() {
 
 #[test]
 fn an_offset_centre_of_mass_obeys_newton_and_euler() {
-    let mut physics = with(Robot::Twil, Hidden::CentrifugalOffset, 1.0);
+    let mut physics = with(Driven::Twil, Hidden::CentrifugalOffset, 1.0);
     physics.motor.inductance *= 1e-3;
-    let k = Robot::Twil.lumped();
+    let k = Driven::Twil.lumped();
     let concealed = hide(
-        &mut Physics::clean(Robot::Twil),
+        &mut Physics::clean(Driven::Twil),
         Hidden::CentrifugalOffset,
         1.0,
     )
@@ -107,7 +107,7 @@ fn an_offset_centre_of_mass_obeys_newton_and_euler() {
 fn friction_holds_what_it_can_hold() {
     // 0.9 V of friction against 0.8 V: no motion at all; against 1 V: motion.
     for (volts, moves) in [(0.8, false), (1.0, true)] {
-        let mut machine = Machine::new(with(Robot::Twil, Hidden::CoulombFriction, 1.0));
+        let mut machine = Machine::new(with(Driven::Twil, Hidden::CoulombFriction, 1.0));
         for _ in 0..10_000 {
             machine.step([volts, -volts]);
         }
@@ -121,14 +121,14 @@ fn friction_holds_what_it_can_hold() {
 /// In the steady state friction of `level` V is that much voltage less.
 #[test]
 fn friction_costs_its_voltage() {
-    let k = Robot::Twil.lumped();
-    let mut machine = Machine::new(with(Robot::Twil, Hidden::CoulombFriction, 1.0));
+    let k = Driven::Twil.lumped();
+    let mut machine = Machine::new(with(Driven::Twil, Hidden::CoulombFriction, 1.0));
     for _ in 0..20_000 {
         machine.step([9.0, 9.0]);
     }
     let expected = -k.k_c * 2.0 * (9.0 - 0.9) / k.k_a;
     assert!((machine.body()[0] - expected).abs() < 1e-6);
-    let mut machine = Machine::new(with(Robot::Twil, Hidden::DirectionalFriction, 1.0));
+    let mut machine = Machine::new(with(Driven::Twil, Hidden::DirectionalFriction, 1.0));
     for _ in 0..20_000 {
         machine.step([-9.0, -9.0]);
     }
@@ -140,7 +140,7 @@ fn friction_costs_its_voltage() {
 
 #[test]
 fn scrub_friction_keeps_the_heading() {
-    let mut machine = Machine::new(with(Robot::Twil, Hidden::ScrubFriction, 1.0));
+    let mut machine = Machine::new(with(Driven::Twil, Hidden::ScrubFriction, 1.0));
     // 1.2 rad/s² is 1.83 V of difference.
     for _ in 0..10_000 {
         machine.step([6.0, 4.4]);
@@ -154,7 +154,7 @@ fn scrub_friction_keeps_the_heading() {
 
 #[test]
 fn play_is_the_gap_and_the_load_lags_by_it() {
-    let mut machine = Machine::new(with(Robot::Axis, Hidden::Backlash, 1.0));
+    let mut machine = Machine::new(with(Driven::Axis, Hidden::Backlash, 1.0));
     for _ in 0..10_000 {
         machine.step([5.0, 0.0]);
     }
@@ -172,7 +172,7 @@ fn tyres_limit_the_traction() {
     let mut before = 0.0;
     let limit = 0.2 * 9.81;
     run(
-        with(Robot::Twil, Hidden::WheelSlip, 1.0),
+        with(Driven::Twil, Hidden::WheelSlip, 1.0),
         4.0,
         |_, machine| {
             let v = machine.body()[0];
@@ -185,7 +185,7 @@ fn tyres_limit_the_traction() {
 #[test]
 fn a_pendulum_keeps_its_energy_but_for_friction() {
     // No motor: coils cut, no friction. Energy of the arm is kept to the integrator's accuracy.
-    let mut physics = with(Robot::Axis, Hidden::GravityPendulum, 1.0);
+    let mut physics = with(Driven::Axis, Hidden::GravityPendulum, 1.0);
     physics.motor.torque_constant = 0.0;
     physics.motor.back_emf_constant = 0.0;
     physics.motor.rotor_friction = 0.0;
@@ -202,7 +202,7 @@ fn a_pendulum_keeps_its_energy_but_for_friction() {
 
 #[test]
 fn a_payload_keeps_the_momentum() {
-    let mut physics = with(Robot::Twil, Hidden::PayloadChange, 1.0);
+    let mut physics = with(Driven::Twil, Hidden::PayloadChange, 1.0);
     physics.payload = physics
         .payload
         .map(|p| crate::physics::Payload { time: 1.0, ..p });
@@ -218,7 +218,11 @@ fn a_payload_keeps_the_momentum() {
 
 #[test]
 fn a_slope_pulls_downhill() {
-    let machine = run(with(Robot::Twil, Hidden::GravitySlope, 1.0), 0.0, |_, _| {});
+    let machine = run(
+        with(Driven::Twil, Hidden::GravitySlope, 1.0),
+        0.0,
+        |_, _| {},
+    );
     let mut machine = machine;
     for _ in 0..5_000 {
         machine.step([0.0; 2]);
@@ -228,8 +232,8 @@ fn a_slope_pulls_downhill() {
 
 #[test]
 fn a_shaft_stops_when_it_should_and_stands() {
-    let k = Robot::Twil.lumped();
-    let mut machine = Machine::new(stiff(with(Robot::Twil, Hidden::CoulombFriction, 1.0)));
+    let k = Driven::Twil.lumped();
+    let mut machine = Machine::new(stiff(with(Driven::Twil, Hidden::CoulombFriction, 1.0)));
     for _ in 0..20_000 {
         machine.step([9.0, 9.0]);
     }
@@ -250,7 +254,7 @@ fn a_shaft_stops_when_it_should_and_stands() {
 /// a delay of its time constant and no more.
 #[test]
 fn the_windings_time_constant_is_a_small_delay() {
-    for robot in [Robot::Twil, Robot::Axis] {
+    for robot in [Driven::Twil, Driven::Axis] {
         let mut u = [0.0; 2];
         let mut squares = [0.0; 2];
         run(Physics::clean(robot), 5.0, |t, machine| {

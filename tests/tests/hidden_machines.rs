@@ -1,0 +1,71 @@
+//! The machines of one command: without an effect their plant explains them.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "recordings that can be made, and a panic is how this program fails"
+)]
+
+use loopsight_core::model::Model;
+use loopsight_diagnosis::{FitSettings, fit};
+use loopsight_hidden::{Experiment, Robot, record};
+use loopsight_plants as _;
+
+/// Fitted to a clean recording, the plant leaves of another one what rounding leaves.
+fn explained(robot: Robot) {
+    let log = record(robot, &[], robot.lesson(), 11).unwrap();
+    let test = record(robot, &[], Experiment::MultiLevel, 12).unwrap();
+    let (model, _) = Model::from_toml("hidden", &log.model_toml).unwrap();
+    let settings = FitSettings::default();
+    let tests = [test.run.clone()];
+    let found = fit::fit(
+        &model,
+        std::slice::from_ref(&log.run),
+        Some(&tests),
+        &[],
+        &settings,
+        &|_, _| {},
+    )
+    .unwrap();
+    let left = loopsight_diagnosis::compare(&found.model, &tests, &[]).unwrap();
+    println!(
+        "{}: {:.3} % of another recording, floor {:.3} %",
+        robot.name(),
+        100.0 * left.nrmse,
+        100.0 * test.floor()
+    );
+    for quantity in &log.truth.lumped {
+        let Some(estimate) = found.parameters.get(quantity.name) else {
+            continue;
+        };
+        println!(
+            "  {} {} (true {})",
+            quantity.name, estimate.value, quantity.value
+        );
+    }
+    assert!(left.nrmse < 1.2 * test.floor());
+}
+
+#[test]
+fn a_clean_oscillator_is_an_oscillator() {
+    explained(Robot::Oscillator);
+}
+
+#[test]
+fn clean_tanks_are_a_tank_pair() {
+    explained(Robot::TankPair);
+}
+
+#[test]
+fn a_clean_arm_is_an_arm() {
+    explained(Robot::Arm);
+}
+
+#[test]
+fn a_clean_slide_is_a_servo_axis() {
+    explained(Robot::ServoAxis);
+}
+
+#[test]
+fn a_clean_cart_is_a_cart_pole() {
+    explained(Robot::CartPole);
+}
