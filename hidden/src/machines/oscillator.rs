@@ -18,8 +18,8 @@ pub(crate) const SHEET: Sheet = Sheet {
 /// Integration step, s, and steps from sample to sample.
 const STEP: f64 = 1e-4;
 const STEPS: usize = 100;
-/// 12 bit over 0.4 m.
-const RESOLUTION: f64 = 0.4 / 4096.0;
+/// 10 bit over 0.4 m.
+const RESOLUTION: f64 = 0.4 / 1024.0;
 
 /// A carriage between springs, with a voice coil whose current, and with it the force, is
 /// controlled; a distance sensor behind a converter.
@@ -145,7 +145,7 @@ impl Rig for Oscillator {
              stiffness = {:?} # N/m\n\
              damping = {:?}    # N s/m\n\
              \n\
-             # A distance sensor, 12 bit over 0.4 m.\n\
+             # A distance sensor, 10 bit over 0.4 m.\n\
              [log.measured.position]\n\
              sensor = \"instantaneous\"\n",
             self.mass, self.stiffness, self.damping
