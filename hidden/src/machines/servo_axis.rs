@@ -17,7 +17,9 @@ pub(crate) const SHEET: Sheet = Sheet {
         "voltage_added_V",
         "control_voltage_V",
     ],
-    command: [0.0, 0.2],
+    // Never zero: where the slide stands, a loop without integral leaves a voltage that only tells how
+    // it came to stand there.
+    command: [0.025, 0.15],
     shows: &[Hidden::DirectionalFriction],
     build: |phase, _| Box::new(ServoAxis::new(phase)),
 };
