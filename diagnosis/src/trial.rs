@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::model::Model;
+use loopsight_core::model::{Model, SimulationOptions};
 use rayon::prelude::*;
 
 use crate::candidates::Candidate;
@@ -151,10 +151,13 @@ fn starts(
     all
 }
 
-/// The model of a candidate with coarser steps.
+/// The model of a candidate with coarser steps. A file that asks for finer steps than usual has lags
+/// that no longer ones stand.
 fn coarse(candidate: &Candidate, step: f64) -> Model {
     let mut model = candidate.model.clone();
-    model.max_step = model.max_step.max(step);
+    if model.max_step >= SimulationOptions::default().max_step_s {
+        model.max_step = model.max_step.max(step);
+    }
     model
 }
 
