@@ -10,7 +10,7 @@ use std::path::Path;
 use loopsight_core::Plant;
 use loopsight_core::model::Model;
 use loopsight_hidden::{
-    Driven, Experiment, Hidden, Recording, Robot, nrmse, overall, record, visibility,
+    Driven, Experiment, Hidden, Recording, Robot, catalogue, nrmse, overall, record, visibility,
 };
 use loopsight_plants::Ddmr;
 
@@ -57,6 +57,26 @@ fn equal_seeds_give_equal_recordings() {
         assert_ne!(a.run, c.run);
         assert_eq!(a.run.inputs, make(&[], experiment, 5).run.inputs);
     }
+    for (robot, effect) in catalogue().split_off(Hidden::ALL.len()) {
+        let log = |seed| record(robot, &[(effect, 1.0)], robot.lesson(), seed).unwrap();
+        assert_eq!(log(5).run, log(5).run);
+        assert_ne!(log(5).run, log(6).run);
+    }
+}
+
+/// Every shipped plant has a machine, and every machine hides something.
+#[test]
+fn no_plant_is_left_out() {
+    let plants = loopsight_core::registry::plants();
+    let text: String = Robot::ALL.map(Robot::model_toml).concat();
+    for plant in plants {
+        let section = format!("[plant.{}", plant.id);
+        assert!(text.contains(&section), "{} has no machine", plant.id);
+    }
+    for robot in Robot::ALL {
+        let shown = catalogue().iter().filter(|(r, _)| *r == robot).count();
+        assert!(shown > 0, "{}", robot.name());
+    }
 }
 
 #[test]
@@ -72,8 +92,8 @@ fn counting_is_the_only_noise() {
 
 #[test]
 fn every_effect_shows_more_the_larger_it_is() {
-    for effect in Hidden::ALL {
-        let change = |size| visibility(effect.home(), *effect, size, Experiment::Prbs, 3).unwrap();
+    for (robot, effect) in catalogue() {
+        let change = |size| visibility(robot, effect, size, robot.lesson(), 3).unwrap();
         let changes = [0.5, 1.0, 2.0].map(change);
         println!("{effect}: {changes:.4?}");
         assert!(changes[1] > 0.01, "{effect} is invisible: {changes:?}");
@@ -191,7 +211,7 @@ fn what_makes_no_sense_is_refused() {
 /// The model files load, and every channel the truth names is one of the plant's.
 #[test]
 fn model_files_load_and_channels_exist() {
-    for robot in [Robot::Twil, Robot::Axis] {
+    for robot in Robot::ALL {
         let log = record(robot, &[], Experiment::Prbs, 1).unwrap();
         let (model, _) = Model::from_toml("model.toml", &log.model_toml).unwrap();
         assert_eq!(model.measured.len(), log.run.n_measured);
@@ -225,16 +245,21 @@ fn the_committed_recordings_are_these() {
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/hidden-effect");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
-    for effect in [
-        Hidden::StribeckFriction,
-        Hidden::Backlash,
-        Hidden::WheelSlip,
+    for (robot, effect) in [
+        (Robot::Twil, Hidden::StribeckFriction),
+        (Robot::Axis, Hidden::Backlash),
+        (Robot::Twil, Hidden::WheelSlip),
+        (Robot::Arm, Hidden::CoulombFriction),
+        (Robot::TankPair, Hidden::DeadZone),
     ] {
-        make(&[(effect, 1.0)], Experiment::Prbs, 1)
+        let lesson = robot.lesson();
+        record(robot, &[(effect, 1.0)], lesson, 1)
+            .unwrap()
             .write_csv(&path)
             .unwrap();
         let made = std::fs::read_to_string(&path).unwrap();
-        let kept = examples.join(effect.id()).join("prbs.csv");
+        let folder = examples.join(robot.case(Some(effect)));
+        let kept = folder.join(format!("{}.csv", lesson.name()));
         let kept = std::fs::read_to_string(kept).unwrap();
         assert_eq!(made.lines().count(), kept.lines().count());
         let same = made

@@ -64,7 +64,7 @@ fn a_force_deflects_the_spring_to_its_balance() {
     // Dry friction holds the carriage where it stops, within its band.
     let mut rig = Oscillator::new(PHASE);
     with(&mut rig, Hidden::CoulombFriction);
-    assert_eq!(hold(&mut rig, 0.2, 100).exact[0], 0.0);
+    assert!(hold(&mut rig, 0.2, 100).exact[0].abs() < 1e-12);
     hold(&mut rig, 4.0, 2000);
     let rest = hold(&mut rig, 0.0, 2000).exact[0];
     assert!(200.0 * rest.abs() < 0.25 && rest != 0.0, "{rest}");
