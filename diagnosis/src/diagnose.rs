@@ -179,6 +179,7 @@ pub(crate) fn diagnose_above(
                 && !other.candidate.separate;
             // On a straight run one wheel stands for both: then both.
             let wider = other.candidate.meta.id == id
+                && !other.candidate.separate
                 && found
                     .candidate
                     .at
