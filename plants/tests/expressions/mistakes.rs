@@ -70,7 +70,7 @@ fn mistakes_in_effects_are_shown_where_they_stand() {
     assert_eq!(shown(&texts), EFFECT_MISTAKES);
 }
 
-const EFFECT_MISTAKES: &str = r#"m:8:20: unknown name `spede`, expected one of c, s, flow, position, drive, load, armature, shaft, stall, nominal, side, time, speed, angle, voltage, supply_load, stall_load, pi, π
+const EFFECT_MISTAKES: &str = r#"m:8:20: unknown name `spede`, expected one of c, s, flow, position, drive, load, armature, shaft, stall, nominal, side, time, speed, angle, voltage, supply_load, stall_load, linear_speed, travel, pi, π
     at `spede`
     did you mean `speed`?
 m:8:15: unknown function `tahn`, expected one of abs, sign, sqrt, exp, ln, sin, cos, tan, asin, acos, atan, sinh, cosh, tanh, min, max, atan2
@@ -106,12 +106,12 @@ m:12:1: `exp` is the name of a function or a constant
     at `exp`
 m:7:1: the channels are given as `at` and as `on`, expected one of them
     at `on`
-m:7:7: the plant `dc_axis` has no channel `shift`, expected one of shaft, load, inertia, input, sensor.speed, sensor.angle
+m:7:7: the plant `dc_axis` has no channel `shift`, expected one of shaft, load, inertia, input, sensor.speed, sensor.angle, sensor.linear_speed, sensor.travel
     at `"shift"`
     did you mean `shaft`?
 m:6:1: `expression` needs `at`: the channels it acts on
     at `[effect.expression]`
-    channels of `dc_axis` where it fits: shaft, load, inertia, input, sensor.speed, sensor.angle
+    channels of `dc_axis` where it fits: shaft, load, inertia, input, sensor.speed, sensor.angle, sensor.linear_speed, sensor.travel
 m:8:8: `coulomb_friction` is the name of an effect of the library
     at `"coulomb_friction"`
 m:9:7: a number or a name is missing before `*`
