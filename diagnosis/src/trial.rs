@@ -22,8 +22,8 @@ pub(crate) const FINAL: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
 };
-/// Longest integration steps of a promise and of a first look, s: below what most sensors see.
-const PROMISE_STEP: f64 = 0.01;
+/// Longest integration step of a promise and of a first look, s: far below what any sensor sees, and
+/// short beside the teeth of a motor that runs by.
 const LOOK_STEP: f64 = 0.005;
 
 /// So many starts of one parameter are a dense list.
@@ -169,10 +169,13 @@ pub(crate) fn promise(
     holdout: &Holdout<'_>,
     nominal: &Solution,
 ) -> Option<f64> {
-    let mut model = coarse(candidate, PROMISE_STEP);
+    let mut model = coarse(candidate, LOOK_STEP);
     for i in candidate.own() {
         let parameter = &mut model.parameters[i];
-        parameter.free &= parameter.declaration.starts.len() < DENSE;
+        if parameter.declaration.starts.len() >= DENSE {
+            parameter.free = false;
+            parameter.value = start.get(i).copied();
+        }
     }
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
     let mut problem =
