@@ -22,12 +22,11 @@ pub(crate) const FINAL: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
 };
-/// Longest integration step of a promise and of a first look, s: far below what any sensor sees, and
-/// short beside the teeth of a motor that runs by.
+/// Longest integration steps of a promise and of a first look, s. Where a position is read the short
+/// one serves both: cogs run by.
+const PROMISE_STEP: f64 = 0.01;
 const LOOK_STEP: f64 = 0.005;
 
-/// So many starts of one parameter are a dense list.
-const DENSE: usize = 20;
 /// Most starts of a candidate that is looked at from where a simpler one ended.
 const GROWN: usize = 3;
 /// An effect at several channels alike is tried at each with its own parameters where it leaves less
@@ -161,22 +160,19 @@ fn coarse(candidate: &Candidate, step: f64) -> Model {
     model
 }
 
-/// What a candidate promises to leave of the cost, from one start; what has a dense list of starts is
-/// held there, for another start does better than a long step.
+/// What a candidate promises to leave of the cost, from one start.
 pub(crate) fn promise(
     candidate: &Candidate,
     start: &[f64],
     holdout: &Holdout<'_>,
     nominal: &Solution,
 ) -> Option<f64> {
-    let mut model = coarse(candidate, LOOK_STEP);
-    for i in candidate.own() {
-        let parameter = &mut model.parameters[i];
-        if parameter.declaration.starts.len() >= DENSE {
-            parameter.free = false;
-            parameter.value = start.get(i).copied();
-        }
-    }
+    let step = if Positions::matter_to(candidate.meta) {
+        LOOK_STEP
+    } else {
+        PROMISE_STEP
+    };
+    let model = coarse(candidate, step);
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
     let mut problem =
         Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {}).ok()?;
