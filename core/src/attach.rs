@@ -182,42 +182,42 @@ impl Model {
     /// The model with its `index`-th effect replaced by the effect `id` at the same channels;
     /// parameters of the same name keep their values.
     pub fn with_effect_replaced(&self, index: usize, id: &str) -> Option<Model> {
-        self.effects.get(index)?;
-        let mut model = self.clone();
-        model.effects.clear();
-        model.parameters.truncate(self.n_plant_parameters);
-        for (k, effect) in self.effects.iter().enumerate() {
+        self.with_effect_changed(index, |model, effect, old| {
             let first = model.parameters.len();
-            let old = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
-            let old = &self.parameters[old];
-            if k == index {
-                let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
-                model = model.with_effect(id, &at)?;
-                for new in &mut model.parameters[first..] {
-                    if let Some(from) = old.iter().find(|p| p.declaration.id == new.declaration.id)
-                    {
-                        new.value = from.value;
-                        new.free = from.free;
-                    }
+            let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
+            let mut model = model.with_effect(id, &at)?;
+            for new in &mut model.parameters[first..] {
+                if let Some(from) = old.iter().find(|p| p.declaration.id == new.declaration.id) {
+                    new.value = from.value;
+                    new.free = from.free;
                 }
-            } else {
-                model.keep(effect, old);
             }
-        }
-        make_names_unique(&mut model.parameters, &model.effects);
-        Some(model)
+            Some(model)
+        })
     }
 
     /// The model without its `index`-th effect.
     pub fn without_effect(&self, index: usize) -> Option<Model> {
+        self.with_effect_changed(index, |model, _, _| Some(model))
+    }
+
+    /// The model with what `change` makes, in the place of its `index`-th effect, of the model up to
+    /// there, the effect, and the effect's parameters.
+    fn with_effect_changed(
+        &self,
+        index: usize,
+        change: impl Fn(Model, &Attached, &[ModelParameter]) -> Option<Model>,
+    ) -> Option<Model> {
         self.effects.get(index)?;
         let mut model = self.clone();
         model.effects.clear();
         model.parameters.truncate(self.n_plant_parameters);
         for (k, effect) in self.effects.iter().enumerate() {
-            if k != index {
-                let first = effect.first_parameter;
-                let own = &self.parameters[first..first + effect.meta.parameters.len()];
+            let first = effect.first_parameter;
+            let own = &self.parameters[first..first + effect.meta.parameters.len()];
+            if k == index {
+                model = change(model, effect, own)?;
+            } else {
                 model.keep(effect, own);
             }
         }

@@ -43,6 +43,25 @@ pub(crate) struct Judged {
     pub(crate) rank: Losses,
 }
 
+impl Judged {
+    /// Judges the solution of `model`, a candidate's; none where its free run leaves the finite numbers.
+    fn of(
+        candidate: Candidate,
+        model: &Model,
+        solution: Solution,
+        holdout: &Holdout<'_>,
+    ) -> Option<Self> {
+        let losses = holdout.judge(model, &solution);
+        let rank = holdout.rank(model, &solution, &losses);
+        nrmse(&rank).is_finite().then_some(Self {
+            candidate,
+            solution,
+            losses,
+            rank,
+        })
+    }
+}
+
 /// Shares of the flow that a speed to be estimated starts from.
 const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
 
@@ -204,14 +223,7 @@ pub(crate) fn look(
         start = problem.solve_from(&start, &states, LOOK).ok()?.values;
     }
     let solution = problem().ok()?.solve_from(&start, &states, LOOK).ok()?;
-    let losses = holdout.judge(&model, &solution);
-    let rank = holdout.rank(&model, &solution, &losses);
-    nrmse(&rank).is_finite().then(|| Judged {
-        candidate: candidate.clone(),
-        solution,
-        losses,
-        rank,
-    })
+    Judged::of(candidate.clone(), &model, solution, holdout)
 }
 
 /// The full fit of a finalist, initial states included, with intervals: as sharply as it can be where
@@ -266,15 +278,6 @@ fn fully(
     }
     let fit = problem.result(&found);
     let solution = problem.solution(&found);
-    let losses = holdout.judge(model, &solution);
-    let rank = holdout.rank(model, &solution, &losses);
-    nrmse(&rank).is_finite().then_some((
-        Judged {
-            candidate: first.candidate,
-            solution,
-            losses,
-            rank,
-        },
-        fit,
-    ))
+    let judged = Judged::of(first.candidate.clone(), model, solution, holdout)?;
+    Some((judged, fit))
 }

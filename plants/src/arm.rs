@@ -104,6 +104,7 @@ const LOAD: [Reads; 4] = [
     Reads(Role::Gravity, "gravity"),
 ];
 
+const AXIS: [Channel; 4] = motor::channels(&JOINT, &LOAD);
 const CHANNELS: [Channel; 6] = [
     Channel {
         id: "joint",
@@ -125,46 +126,10 @@ const CHANNELS: [Channel; 6] = [
         size: 1.0,
         doc: "the arm; efforts as angular acceleration",
     },
-    Channel {
-        id: "inertia",
-        place: Place::Rate(0),
-        unit: "rad/s^2",
-        equation: "ω' -> ω' + w(ω')",
-        reads: &LOAD,
-        side: 0,
-        size: 1.0,
-        doc: "the acceleration itself: where inertia acts",
-    },
-    Channel {
-        id: "input",
-        place: Place::Input(0),
-        unit: "V",
-        equation: "V -> V + w(V)",
-        reads: &JOINT,
-        side: 0,
-        size: 1.0,
-        doc: "between the commanded and the effective voltage",
-    },
-    Channel {
-        id: "sensor.speed",
-        place: Place::Output(0),
-        unit: "rad/s",
-        equation: "ω_measured = ω + w",
-        reads: &JOINT,
-        side: 0,
-        size: 1.0,
-        doc: "measurement of the speed",
-    },
-    Channel {
-        id: "sensor.angle",
-        place: Place::Output(1),
-        unit: "rad",
-        equation: "φ_measured = φ + w",
-        reads: &JOINT,
-        side: 0,
-        size: 1.0,
-        doc: "measurement of the angle",
-    },
+    AXIS[0],
+    AXIS[1],
+    AXIS[2],
+    AXIS[3],
 ];
 
 impl Plant<2, 1, 2, 4, 4> for Arm {
@@ -181,24 +146,9 @@ impl Plant<2, 1, 2, 4, 4> for Arm {
         ],
         inputs: &[Signal::new("voltage", "V", "V", "voltage on the motor")],
         outputs: &[
-            Signal::new(
-                "supply_load",
-                "V U",
-                "V^2",
-                "load on the supply: command times armature voltage",
-            ),
-            Signal::new(
-                "stall_load",
-                "V²",
-                "V^2",
-                "load on the supply if the motor stood still",
-            ),
-            Signal::new(
-                "armature",
-                "U",
-                "V",
-                "voltage over the motor's winding, V less what K_A takes at this speed",
-            ),
+            motor::OUTPUTS[0],
+            motor::OUTPUTS[1],
+            motor::OUTPUTS[2],
             Signal::new(
                 "gravity",
                 "g_φ",
@@ -238,9 +188,7 @@ impl Plant<2, 1, 2, 4, 4> for Arm {
 
     fn output<S: Real>(index: usize, x: &[S; 2], u: &[S; 1], p: &[S; 4]) -> S {
         match index {
-            0 => u[0] * motor::armature(u[0], x[0], p[0], p[1]),
-            1 => u[0] * u[0],
-            2 => motor::armature(u[0], x[0], p[0], p[1]),
+            0..3 => motor::output(index, u[0], x[0], p[0], p[1]),
             _ => gravity(x, p),
         }
     }

@@ -95,6 +95,7 @@ const LOAD: [Reads; 3] = [
     Reads(Role::Shaft, "angle"),
 ];
 
+const AXIS: [Channel; 4] = motor::channels(&MOTOR, &LOAD);
 const CHANNELS: [Channel; 8] = [
     Channel {
         id: "shaft",
@@ -116,46 +117,10 @@ const CHANNELS: [Channel; 8] = [
         size: 1.0,
         doc: "the load; efforts as angular acceleration",
     },
-    Channel {
-        id: "inertia",
-        place: Place::Rate(0),
-        unit: "rad/s^2",
-        equation: "ω' -> ω' + w(ω')",
-        reads: &LOAD,
-        side: 0,
-        size: 1.0,
-        doc: "the acceleration itself: where inertia acts",
-    },
-    Channel {
-        id: "input",
-        place: Place::Input(0),
-        unit: "V",
-        equation: "V -> V + w(V)",
-        reads: &MOTOR,
-        side: 0,
-        size: 1.0,
-        doc: "between the commanded and the effective voltage",
-    },
-    Channel {
-        id: "sensor.speed",
-        place: Place::Output(0),
-        unit: "rad/s",
-        equation: "ω_measured = ω + w",
-        reads: &MOTOR,
-        side: 0,
-        size: 1.0,
-        doc: "measurement of the speed",
-    },
-    Channel {
-        id: "sensor.angle",
-        place: Place::Output(1),
-        unit: "rad",
-        equation: "φ_measured = φ + w",
-        reads: &MOTOR,
-        side: 0,
-        size: 1.0,
-        doc: "measurement of the angle",
-    },
+    AXIS[0],
+    AXIS[1],
+    AXIS[2],
+    AXIS[3],
     Channel {
         id: "sensor.linear_speed",
         place: Place::Output(6),
@@ -192,24 +157,9 @@ impl Plant<2, 1, 2, 3, 5> for DcAxis {
         ],
         inputs: &[Signal::new("voltage", "V", "V", "voltage on the motor")],
         outputs: &[
-            Signal::new(
-                "supply_load",
-                "V U",
-                "V^2",
-                "load on the supply: command times armature voltage",
-            ),
-            Signal::new(
-                "stall_load",
-                "V²",
-                "V^2",
-                "load on the supply if the motor stood still",
-            ),
-            Signal::new(
-                "armature",
-                "U",
-                "V",
-                "voltage over the motor's winding, V less what K_A takes at this speed",
-            ),
+            motor::OUTPUTS[0],
+            motor::OUTPUTS[1],
+            motor::OUTPUTS[2],
             Signal::new("linear_speed", "v", "m/s", "speed of a linear axis"),
             Signal::new("travel", "s", "m", "travel of a linear axis"),
         ],
@@ -233,9 +183,7 @@ impl Plant<2, 1, 2, 3, 5> for DcAxis {
     fn output<S: Real>(index: usize, x: &[S; 2], u: &[S; 1], p: &[S; 3]) -> S {
         let [k_a, k_c, radius] = *p;
         match index {
-            0 => u[0] * motor::armature(u[0], x[0], k_a, k_c),
-            1 => u[0] * u[0],
-            2 => motor::armature(u[0], x[0], k_a, k_c),
+            0..3 => motor::output(index, u[0], x[0], k_a, k_c),
             3 => radius * x[0],
             _ => radius * x[1],
         }

@@ -8,7 +8,7 @@
 //! neglected: T. G. Alves, W. F. Lages, R. V. B. Henriques (2018), IFAC PapersOnLine 51-15, 437–442,
 //! equations (11)–(16), (22).
 
-use loopsight_core::{Derived, Parameter, Real};
+use loopsight_core::{Channel, Derived, Parameter, Place, Reads, Real, Signal};
 
 pub(crate) const DAMPING: Parameter = Parameter::new(
     "K_A",
@@ -110,6 +110,76 @@ pub(crate) const FEEDFORWARD: [Derived; 2] = [
     ),
 ];
 
+/// What an axis behind a motor tells besides its state: the load on the supply, that at rest, and
+/// the voltage over the winding.
+pub(crate) const OUTPUTS: [Signal; 3] = [
+    Signal::new(
+        "supply_load",
+        "V U",
+        "V^2",
+        "load on the supply: command times armature voltage",
+    ),
+    Signal::new(
+        "stall_load",
+        "V²",
+        "V^2",
+        "load on the supply if the motor stood still",
+    ),
+    Signal::new(
+        "armature",
+        "U",
+        "V",
+        "voltage over the motor's winding, V less what K_A takes at this speed",
+    ),
+];
+
+/// The channels that every axis behind a motor has, where effects read `motor` or, at the body, `load`:
+/// its inertia, its input, and the sensors of its speed and angle.
+pub(crate) const fn channels(motor: &'static [Reads], load: &'static [Reads]) -> [Channel; 4] {
+    [
+        Channel {
+            id: "inertia",
+            place: Place::Rate(0),
+            unit: "rad/s^2",
+            equation: "ω' -> ω' + w(ω')",
+            reads: load,
+            side: 0,
+            size: 1.0,
+            doc: "the acceleration itself: where inertia acts",
+        },
+        Channel {
+            id: "input",
+            place: Place::Input(0),
+            unit: "V",
+            equation: "V -> V + w(V)",
+            reads: motor,
+            side: 0,
+            size: 1.0,
+            doc: "between the commanded and the effective voltage",
+        },
+        Channel {
+            id: "sensor.speed",
+            place: Place::Output(0),
+            unit: "rad/s",
+            equation: "ω_measured = ω + w",
+            reads: motor,
+            side: 0,
+            size: 1.0,
+            doc: "measurement of the speed",
+        },
+        Channel {
+            id: "sensor.angle",
+            place: Place::Output(1),
+            unit: "rad",
+            equation: "φ_measured = φ + w",
+            reads: motor,
+            side: 0,
+            size: 1.0,
+            doc: "measurement of the angle",
+        },
+    ]
+}
+
 /// `[K_T, K_a, R_a, n, J, f]`.
 pub(crate) type Motor<S> = [S; 6];
 
@@ -121,12 +191,21 @@ pub(crate) fn lumped<S: Real>(inertia: S, motor: &Motor<S>) -> ([S; 2], S) {
 }
 
 /// Voltage over the winding: the command less the back-emf at this speed.
-pub(crate) fn armature<S: Real>(voltage: S, speed: S, k_a: S, k_c: S) -> S {
+fn armature<S: Real>(voltage: S, speed: S, k_a: S, k_c: S) -> S {
     // A motor without drive has no back-emf to speak of.
     if k_c.abs() > S::of(1e-9) {
         voltage + k_a / k_c * speed
     } else {
         voltage
+    }
+}
+
+/// The `index`-th of [`OUTPUTS`].
+pub(crate) fn output<S: Real>(index: usize, voltage: S, speed: S, k_a: S, k_c: S) -> S {
+    match index {
+        0 => voltage * armature(voltage, speed, k_a, k_c),
+        1 => voltage * voltage,
+        _ => armature(voltage, speed, k_a, k_c),
     }
 }
 

@@ -222,11 +222,7 @@ impl Serialize for Part {
 impl<'de> Deserialize<'de> for Part {
     fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let table = EffectTable::deserialize(from)?;
-        let given = table.parameters.iter().map(|(id, p)| p.given(id).0);
-        let values = Values {
-            set: 0,
-            given: given.collect(),
-        };
+        let values = table.parameters.values();
         Ok(Self { table, values })
     }
 }

@@ -13,7 +13,7 @@ use super::lexer::is_name;
 use super::operation::{constant, function};
 use super::tree::{Slot, Tree};
 use crate::config::{Mistake, Step};
-use crate::registry::range_text;
+use crate::registry::{Values, range_text};
 use crate::{Parameter, unit};
 
 /// A table with names of the author's, in the order of the file.
@@ -145,6 +145,16 @@ impl<'de> Deserialize<'de> for ParameterTable {
 
 /// The table of the parameters.
 const PARAMETERS: &str = "parameters";
+
+impl Ordered<ParameterTable> {
+    /// The values that are given, in the order of the file.
+    pub(crate) fn values(&self) -> Values {
+        Values {
+            set: 0,
+            given: self.iter().map(|(id, p)| p.given(id).0).collect(),
+        }
+    }
+}
 
 impl ParameterTable {
     /// Its value and where that stands.
