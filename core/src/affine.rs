@@ -9,6 +9,9 @@ use crate::registry::HostReal;
 #[derive(Clone)]
 pub struct Affine {
     model: Model,
+    values: Vec<f64>,
+    /// `values` changed since `p` was made from them.
+    learned: bool,
     p: Vec<f64>,
     x: Vec<f64>,
     u: Vec<f64>,
@@ -23,8 +26,11 @@ impl Model {
         if self.plant.controlled.is_empty() {
             return None;
         }
+        let values = self.values();
         Some(Affine {
-            p: self.lower(&self.values()),
+            p: self.lower(&values),
+            values,
+            learned: false,
             x: vec![0.0; self.n_states()],
             u: vec![0.0; self.plant.inputs.len()],
             w: vec![0.0; self.n_efforts()],
@@ -46,6 +52,11 @@ impl AffineModel<f64> for Affine {
         if y.len() != n || drift.len() != n || input_matrix.len() != n * n {
             return;
         }
+        if self.learned {
+            let plant = &self.values[..self.model.n_plant_parameters];
+            dynamics.lower(self.model.set, plant, &mut self.p);
+            self.learned = false;
+        }
         for (state, value) in controlled.iter().zip(y) {
             self.x[*state] = *value;
         }
@@ -61,6 +72,17 @@ impl AffineModel<f64> for Affine {
             for (row, state) in controlled.iter().enumerate() {
                 input_matrix[row * n + column] = self.dx[*state] - drift[row];
             }
+        }
+    }
+
+    /// What is not finite, or no parameter of the model, is ignored.
+    fn learn(&mut self, parameter: usize, value: f64) {
+        if let Some(known) = self.values.get_mut(parameter)
+            && value.is_finite()
+            && *known != value
+        {
+            *known = value;
+            self.learned = true;
         }
     }
 }

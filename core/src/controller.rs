@@ -37,6 +37,11 @@ pub trait AffineModel<S: Real> {
     fn size(&self) -> usize;
     /// Drift `f` (length `size`) and input matrix `G` (row by row, `size * size`) at `y`.
     fn evaluate(&mut self, y: &[S], drift: &mut [S], input_matrix: &mut [S]);
+    /// Takes the value that was learned for a parameter (by its index in the model), for every
+    /// [`AffineModel::evaluate`] from now on. A model that learns nothing ignores it.
+    fn learn(&mut self, parameter: usize, value: S) {
+        let _ = (parameter, value);
+    }
 }
 
 /// Computes the command from reference, measurement and model.

@@ -1,15 +1,27 @@
 //! Identification while the loop runs.
 
+use serde::{Deserialize, Serialize};
+
 use crate::model::Model;
 use crate::registry::{BuildError, EstimatorPart};
 use crate::regression::{Regression, RegressionError, Scheme};
-use crate::{Estimator, Innovation, Observer, Sample, Tick};
+use crate::{AffineModel, Estimator, Innovation, Observation, Observer};
+
+/// `[learning]` of a loop file: what is done with an estimator, whichever it is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LearningSettings {
+    /// The controller uses the estimates as if they were true. Otherwise it keeps the model of the
+    /// model file, and the estimates are only watched.
+    pub certainty_equivalence: bool,
+}
 
 /// One recursive estimator per controlled state, fed with the regressions of the model.
 ///
 /// It watches a loop as its [`Observer`]; nothing is allocated in
 /// [`observe`](Observer::observe).
 pub struct Identification {
+    settings: LearningSettings,
     regression: Regression,
     estimators: Vec<Box<dyn Estimator<f64>>>,
     innovations: Vec<Option<Innovation<f64>>>,
@@ -33,6 +45,7 @@ impl Identification {
         model: &Model,
         scheme: Scheme,
         part: &dyn EstimatorPart,
+        settings: &LearningSettings,
     ) -> Result<Self, IdentificationError> {
         let regression = Regression::new(model, scheme)?;
         let mut estimators = Vec::new();
@@ -46,6 +59,7 @@ impl Identification {
         }
         let innovations = vec![None; estimators.len()];
         Ok(Self {
+            settings: settings.clone(),
             regression,
             estimators,
             innovations,
@@ -79,38 +93,31 @@ impl Identification {
 }
 
 impl Observer<f64> for Identification {
-    fn observe(
-        &mut self,
-        _tick: &Tick<f64>,
-        sample: &Sample<f64>,
-        measured: &[f64],
-        applied: &[f64],
-    ) {
+    fn observe(&mut self, seen: &Observation<'_, f64>) {
         self.innovations.fill(None);
-        if !sample.fresh {
+        if !seen.sample.fresh {
             // A late answer would teach the regression a wrong rate.
             self.regression.restart();
             return;
         }
-        if self.regression.push(sample.time, measured, applied) {
+        let time = seen.sample.time;
+        if self.regression.push(time, seen.measured, seen.applied) {
             for (row, estimator) in self.estimators.iter_mut().enumerate() {
                 let (phi, y) = self.regression.row(row);
                 self.innovations[row] = Some(estimator.update(phi, y));
             }
         }
     }
-}
 
-impl Observer<f64> for Option<Identification> {
-    fn observe(
-        &mut self,
-        tick: &Tick<f64>,
-        sample: &Sample<f64>,
-        measured: &[f64],
-        applied: &[f64],
-    ) {
-        if let Some(identification) = self {
-            identification.observe(tick, sample, measured, applied);
+    fn teach(&self, model: &mut dyn AffineModel<f64>) {
+        if !self.settings.certainty_equivalence {
+            return;
+        }
+        for (row, estimator) in self.estimators.iter().enumerate() {
+            let parameters = self.regression.parameters(row);
+            for (parameter, value) in parameters.iter().zip(estimator.theta()) {
+                model.learn(*parameter, *value);
+            }
         }
     }
 }

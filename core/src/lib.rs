@@ -79,7 +79,7 @@ pub use plant::check_sizes as plant_check;
 pub use plant::{ControlAffine, Dynamics, Parameterization, Plant, PlantMeta};
 pub use real::Real;
 pub use signal::Signal;
-pub use tick::{Loop, Observer, Step, Tick, TickError};
+pub use tick::{Loop, Observation, Observer, Step, Tick, TickError};
 
 #[doc(hidden)]
 pub mod __private {

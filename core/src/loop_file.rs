@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Source, Step};
 use crate::excitation::{self, Excitation, Sequence};
-use crate::identification::{Identification, IdentificationError};
+use crate::identification::{Identification, IdentificationError, LearningSettings};
 use crate::model::{Affine, Model};
 use crate::registry::{
     BuildError, ControllerPart, DriverContext, DriverPart, EstimatorPart, HostDriver,
@@ -41,6 +41,9 @@ pub struct LoopFile {
     /// Regression that the estimator is fed with.
     #[serde(default)]
     pub regression: Scheme,
+    /// What is done with the estimator.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub learning: Option<LearningSettings>,
     /// References of the controlled signals; 0 where none is given.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub reference: BTreeMap<String, Excitation>,
@@ -147,11 +150,17 @@ impl LoopFile {
             .build(context)
             .map_err(|e| placed(source, &["driver".into(), driver_id.into()], e))?;
         let identification = match &self.estimator {
+            None if self.learning.is_some() => {
+                let message = "`learning` says what is done with an estimator, and there is none";
+                let help = "add one, e.g. [estimator.rls]".to_owned();
+                return Err(source.error(&["learning".into()], message, Some(help)));
+            }
             None => None,
             Some(part) => {
+                let settings = self.learning.clone().unwrap_or_default();
                 let path: [Step; 2] = ["estimator".into(), part.meta().id.into()];
                 Some(
-                    Identification::new(model, self.regression, part.as_ref()).map_err(
+                    Identification::new(model, self.regression, part.as_ref(), &settings).map_err(
                         |error| match error {
                             IdentificationError::Build(error) => placed(source, &path, error),
                             IdentificationError::Regression(error) => {

@@ -11,8 +11,8 @@ use loopsight_core::model::Model;
 use loopsight_core::registry::{ControllerPart, EstimatorPart};
 use loopsight_core::simulate::Simulator;
 use loopsight_core::{
-    AffineModel, Clock, Controller, Driver, DriverFault, Estimator, Loop, Observer, Sample,
-    SimulatedClock, Tick,
+    AffineModel, Clock, Controller, Driver, DriverFault, Estimator, Loop, Observation, Observer,
+    Sample, SimulatedClock, Tick,
 };
 use loopsight_estimators::{Rls, RlsSettings};
 use loopsight_plants as _;
@@ -194,7 +194,8 @@ struct Learner {
 }
 
 impl Observer<f64> for Learner {
-    fn observe(&mut self, _: &Tick<f64>, _: &Sample<f64>, measured: &[f64], applied: &[f64]) {
+    fn observe(&mut self, seen: &Observation<'_, f64>) {
+        let (measured, applied) = (seen.measured, seen.applied);
         let [v, omega] = self.before;
         let phi = [v, omega * omega, applied[0] + applied[1]];
         self.estimator.update(&phi, (measured[0] - v) / PERIOD);
