@@ -61,6 +61,21 @@ impl Candidate {
         smooth(&mut sharp.model, n, share * sharp.flow).then_some(sharp)
     }
 
+    /// Whether, with these `values`, one of its speeds drowns in the width over which its sign is
+    /// smoothed: what is left of it then sharpens the sign, and is no effect of its own.
+    pub(crate) fn drowns(&self, values: &[f64]) -> bool {
+        let speeds = |width: bool| {
+            self.own().filter_map(move |i| {
+                let declaration = &self.model.parameters[i].declaration;
+                (declaration.unit == "flow" && is_width(declaration) == width)
+                    .then(|| values.get(i).copied())
+                    .flatten()
+            })
+        };
+        let width = speeds(true).fold(0.0, f64::max);
+        speeds(false).any(|speed| speed < CLEAR * width)
+    }
+
     /// The candidate with the values of `start` for those of its parameters that are not estimated.
     pub(crate) fn chosen(&self, start: &[f64]) -> Self {
         let mut chosen = self.clone();
@@ -138,6 +153,9 @@ pub(crate) fn candidates(model: &Model, rms: &[f64]) -> Vec<Candidate> {
 
 /// Share of the flow over which a sign is smoothed: wide enough for a fit to find its way.
 const WIDTH: f64 = 0.02;
+
+/// A speed that matters is so many times the width of a smoothed sign: `tanh(3)` is 0.995.
+const CLEAR: f64 = 3.0;
 
 /// Gives the last effect of `model` the widths that suit the recording; returns the root mean
 /// square of the flow at its channels.

@@ -256,7 +256,7 @@ const SHARP: [f64; 2] = [0.004, 0.01];
 /// integrator are too long for what is to stick.
 const WILD: f64 = 1e4;
 
-/// The full fit; none where its derivatives run wild.
+/// The full fit; none where its derivatives run wild or the effect is none of its own.
 fn fully(
     first: Judged,
     holdout: &Holdout<'_>,
@@ -276,8 +276,11 @@ fn fully(
     if problem.steepness(&found) > wild {
         return None;
     }
-    let fit = problem.result(&found);
     let solution = problem.solution(&found);
+    if first.candidate.drowns(&solution.values) {
+        return None;
+    }
+    let fit = problem.result(&found);
     let judged = Judged::of(first.candidate.clone(), model, solution, holdout)?;
     Some((judged, fit))
 }

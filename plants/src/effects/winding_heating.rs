@@ -48,7 +48,8 @@ impl Effect<2, 1> for WindingHeating {
             .within(0.0, 1.0)
             .or(0.0)
             .nonlinear()
-            .scaled(0.0003),
+            .scaled(0.0003)
+            .starting_at(&[0.0003, 0.001]),
             Parameter::new("cooling", "c", "1/s", "one over the thermal time constant")
                 .within(0.0, 10.0)
                 .or(0.0)
