@@ -9,11 +9,12 @@
 //! voltage_left = { sum = [{ constant = 2.0 }, { sine = { amplitude = 1.0, frequency_hz = 0.5 } }] }
 //! ```
 //!
-//! Values are in the SI unit of the signal they drive.
+//! Values are in the SI unit of the signal they drive; those of a file in the unit of its column.
 //!
 //! Reference: L. Ljung (1999), "System Identification: Theory for the User", 2nd edition, section
 //! 13.3, on pseudo-random binary signals, sums of sines and chirps.
 
+mod points;
 mod sequence;
 
 use std::collections::BTreeMap;
@@ -23,6 +24,8 @@ use serde::{Deserialize, Serialize};
 use crate::Signal;
 use crate::config::nearest;
 use crate::registry::BuildError;
+pub use points::Between;
+use points::Points;
 use sequence::Kind;
 pub use sequence::{Sequence, sample_rows};
 
@@ -101,8 +104,46 @@ pub enum Excitation {
         #[serde(default)]
         common: bool,
     },
+    /// Through points, e.g. a robot's speeds on its way.
+    Waypoints {
+        /// `[time (s), value]`, times increasing.
+        at: Vec<[f64; 2]>,
+        /// What runs between two points.
+        #[serde(default)]
+        between: Between,
+    },
+    /// A column of a log or of any other table with a column of times.
+    File {
+        /// The file, relative to the one that names it.
+        path: String,
+        /// The column, with or without its unit; `None`: the one named like the signal.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        column: Option<String>,
+        /// What runs between two rows.
+        #[serde(default)]
+        between: Between,
+    },
     /// The sum of several.
     Sum(Vec<Excitation>),
+}
+
+/// Reads a column of a file: path as written, name of the column with or without its unit. Returns
+/// `[time (s), value]` in SI units, times increasing.
+pub type ReadColumn<'a> = dyn Fn(&str, &str) -> Result<Vec<[f64; 2]>, BuildError> + 'a;
+
+/// For whoever has no files.
+fn no_files(path: &str, _: &str) -> Result<Vec<[f64; 2]>, BuildError> {
+    Err(BuildError::at(
+        "path",
+        format!("`{path}` cannot be read: there are no files here"),
+    ))
+}
+
+/// What is driven, and how its files are read.
+#[derive(Clone, Copy)]
+struct Driven<'a> {
+    signal: &'a str,
+    read: &'a ReadColumn<'a>,
 }
 
 fn one() -> u64 {
@@ -120,10 +161,16 @@ impl Excitation {
     /// # Ok::<(), loopsight_core::registry::BuildError>(())
     /// ```
     pub fn build(&self, signal: &str) -> Result<Sequence, BuildError> {
-        self.build_at("", stream_of(signal))
+        let read: &ReadColumn<'_> = &no_files;
+        self.build_at("", stream_of(signal), Driven { signal, read })
     }
 
-    fn build_at(&self, path: &str, stream: u64) -> Result<Sequence, BuildError> {
+    fn build_at(
+        &self,
+        path: &str,
+        stream: u64,
+        driven: Driven<'_>,
+    ) -> Result<Sequence, BuildError> {
         let at = |key: &str| join(path, key);
         let finite = |key: &str, value: f64| {
             if value.is_finite() {
@@ -152,19 +199,27 @@ impl Excitation {
         match self {
             Self::Constant(value) => finite("constant", *value)?,
             Self::Steps { at: list } => {
-                for (i, [time, value]) in list.iter().enumerate() {
-                    let before = i.checked_sub(1).map(|j| list[j][0]);
-                    let in_order = before.is_none_or(|b| *time > b);
-                    if !(time.is_finite() && value.is_finite() && in_order) {
-                        return Err(BuildError::at(
-                            &at("steps.at"),
-                            format!(
-                                "entry {} is [{time}, {value}], expected [time, value] with times that increase",
-                                i + 1
-                            ),
-                        ));
-                    }
+                if !list.is_empty() {
+                    in_order(&at("steps.at"), list)?;
                 }
+                return Ok(Sequence(Kind::Steps(list.clone())));
+            }
+            Self::Waypoints { at: list, between } => {
+                in_order(&at("waypoints.at"), list)?;
+                return Ok(Sequence(Kind::Points(Points::new(list.clone(), *between))));
+            }
+            Self::File {
+                path: file,
+                column,
+                between,
+            } => {
+                let column = column.as_deref().unwrap_or(driven.signal);
+                let list = (driven.read)(file, column).map_err(|e| BuildError {
+                    key: at(&format!("file.{}", e.key)),
+                    ..e
+                })?;
+                in_order(&at("file.path"), &list)?;
+                return Ok(Sequence(Kind::Points(Points::new(list, *between))));
             }
             Self::Ramp {
                 from,
@@ -230,7 +285,7 @@ impl Excitation {
                     .enumerate()
                     .map(|(i, part)| {
                         let own = stream.rotate_left(7).wrapping_add(i as u64 + 1);
-                        part.build_at(&at(&format!("sum[{i}]")), own)
+                        part.build_at(&at(&format!("sum[{i}]")), own, driven)
                     })
                     .collect();
                 return Ok(Sequence(Kind::Sum(parts?)));
@@ -245,6 +300,15 @@ impl Excitation {
 pub fn build(
     given: &BTreeMap<String, Excitation>,
     signals: &[Signal],
+) -> Result<Vec<Sequence>, BuildError> {
+    build_with(given, signals, &no_files)
+}
+
+/// As [`build()`], where files can be read.
+pub fn build_with(
+    given: &BTreeMap<String, Excitation>,
+    signals: &[Signal],
+    read: &ReadColumn<'_>,
 ) -> Result<Vec<Sequence>, BuildError> {
     if let Some(unknown) = given.keys().find(|k| signals.iter().all(|s| s.id != *k)) {
         let ids: Vec<&str> = signals.iter().map(|s| s.id).collect();
@@ -263,10 +327,20 @@ pub fn build(
     signals
         .iter()
         .map(|signal| match given.get(signal.id) {
-            Some(excitation) => excitation.build_at(signal.id, stream_of(signal.id)),
+            Some(excitation) => {
+                let driven = Driven {
+                    signal: signal.id,
+                    read,
+                };
+                excitation.build_at(signal.id, stream_of(signal.id), driven)
+            }
             None => Ok(Sequence::default()),
         })
         .collect()
+}
+
+fn in_order(key: &str, list: &[[f64; 2]]) -> Result<(), BuildError> {
+    points::mistake(list).map_or(Ok(()), |message| Err(BuildError::at(key, message)))
 }
 
 fn join(path: &str, key: &str) -> String {
@@ -337,5 +411,25 @@ mod tests {
             at: vec![[2.0, 1.0], [1.0, 0.0]],
         };
         assert!(back.build("").unwrap_err().message.contains("entry 2"));
+    }
+
+    #[test]
+    fn a_file_gives_the_column_of_its_signal_or_the_one_named() {
+        let text = "voltage_right = { file = { path = \"w.csv\" } }\n\
+                    voltage_left = { file = { path = \"w.csv\", column = \"u\", between = \"held\" } }\n";
+        let given: BTreeMap<String, Excitation> = toml::from_str(text).unwrap();
+        let read = |path: &str, column: &str| match (path, column) {
+            ("w.csv", "voltage_right") => Ok(vec![[0.0, 1.0], [1.0, 3.0]]),
+            ("w.csv", "u") => Ok(vec![[0.0, 5.0], [1.0, 7.0]]),
+            _ => Err(BuildError::at("column", format!("no {column}"))),
+        };
+        let both = build_with(&given, &SIGNALS, &read).unwrap();
+        assert_eq!(sample_rows(&both, &[0.5]), [2.0, 5.0]);
+        let error =
+            build_with(&given, &SIGNALS, &|_, _| Ok(vec![[1.0, 0.0], [0.0, 0.0]])).unwrap_err();
+        assert_eq!(error.key, "voltage_right.file.path");
+        assert!(error.message.contains("entry 2"), "{error}");
+        let error = build(&given, &SIGNALS).unwrap_err();
+        assert!(error.message.contains("w.csv"), "{error}");
     }
 }

@@ -137,7 +137,7 @@ impl LoopFile {
             }
         }
         let signals: Vec<Signal> = controlled.iter().map(|s| **s).collect();
-        let references = excitation::build(&self.reference, &signals)
+        let references = excitation::build_with(&self.reference, &signals, context.read_column)
             .map_err(|e| placed(source, &["reference".into()], e))?;
         let controller_id = self.controller.meta().id;
         let controller = self

@@ -280,6 +280,8 @@ pub struct DriverContext<'a> {
     pub load_model: &'a dyn Fn(&str) -> Result<Model, BuildError>,
     /// Loads the runs of a recording for `model`, by a path relative to the loop file.
     pub load_runs: &'a LoadRuns<'a>,
+    /// Reads a column of a table, by a path relative to the loop file.
+    pub read_column: &'a crate::excitation::ReadColumn<'a>,
 }
 
 /// A driver as it stands in a file: `[driver.<id>]`.

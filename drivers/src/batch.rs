@@ -9,7 +9,8 @@ use crate::simulated::Simulated;
 
 /// The robot `model` driven by a given sequence: row `k` of `inputs` is applied from `time[k]` to
 /// `time[k + 1]`, row `k` of the result was measured at `time[k]`. The robot starts at rest at
-/// `time[0]`; the inputs of the result are those applied, within the limits. `settings.model` is
+/// `time[0]`; the inputs of the result are those applied, within the limits; a sample that gets lost is
+/// missing (NaN). `settings.model` is
 /// not used: `model` is the robot.
 pub fn simulate_inputs(
     model: &Model,
@@ -63,6 +64,9 @@ pub fn simulate_inputs(
                 format!("the robot left the finite numbers before {} s", time[k]),
             )
             .help("its parameters make it unstable"));
+        }
+        if robot.loses() {
+            row.fill(f64::NAN);
         }
     }
     let last = run.inputs.len().saturating_sub(n_inputs);

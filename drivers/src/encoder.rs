@@ -80,6 +80,8 @@ enum Angle {
 /// One encoder; signals that share a shaft share its counts and so their rounding.
 #[derive(Clone, Debug)]
 struct Shaft {
+    /// The signal whose angle, or whose integral, is counted.
+    id: String,
     angle: Angle,
     counter: Counter,
     /// Angle at the last reading, rad.
@@ -113,13 +115,14 @@ impl Encoders {
             let Sensor::EncoderCounts(encoder) = &m.sensor else {
                 continue;
             };
-            let mut wire = |angle: Angle, gain: f64| {
+            let mut wire = |id: &str, angle: Angle, gain: f64| {
                 let resolution = encoder.resolution();
                 let known = shafts
                     .iter()
                     .position(|s| s.angle == angle && s.counter.resolution() == resolution);
                 let shaft = known.unwrap_or_else(|| {
                     shafts.push(Shaft {
+                        id: id.to_owned(),
                         angle,
                         counter: Counter::new(resolution, random.random(), 0.0),
                         last: 0.0,
@@ -134,13 +137,13 @@ impl Encoders {
                 });
             };
             if encoder.of.is_empty() {
-                wire(Angle::Integral(measured), 1.0);
+                wire(m.signal.id, Angle::Integral(measured), 1.0);
             }
             for (id, gain) in &encoder.of {
                 let known = signals(model.plant).enumerate().find(|(_, s)| s.id == *id);
                 match known {
                     Some((index, signal)) if signal.unit == "rad" => {
-                        wire(Angle::Signal(index), *gain)
+                        wire(id, Angle::Signal(index), *gain)
                     }
                     _ => {
                         let angles: Vec<&str> = signals(model.plant)
@@ -158,6 +161,12 @@ impl Encoders {
         Ok(Self { shafts, wires })
     }
 
+    /// The counted shafts by the signal that turns them, with their numbers.
+    pub(crate) fn shafts(&self) -> Vec<(String, usize)> {
+        let numbered = self.shafts.iter().enumerate();
+        numbered.map(|(number, s)| (s.id.clone(), number)).collect()
+    }
+
     /// Counts begin at the present angles; `now` are the signals of the plant.
     pub(crate) fn start(&mut self, now: &[f64]) {
         for shaft in &mut self.shafts {
@@ -168,14 +177,22 @@ impl Encoders {
         }
     }
 
-    /// Counts up to the present angles and rounds the means `measured` over `period` s.
-    pub(crate) fn count(&mut self, now: &[f64], period: f64, measured: &mut [f64]) {
-        for shaft in &mut self.shafts {
+    /// Counts up to the present angles and rounds the means `measured` over `period` s; a shaft
+    /// that does not count (by its number) seems to stand.
+    pub(crate) fn count(
+        &mut self,
+        now: &[f64],
+        period: f64,
+        measured: &mut [f64],
+        counts: impl Fn(usize) -> bool,
+    ) {
+        for (number, shaft) in self.shafts.iter_mut().enumerate() {
             let angle = match shaft.angle {
                 Angle::Signal(index) => now[index],
                 Angle::Integral(index) => shaft.last + measured[index] * period,
             };
-            let counted = shaft.counter.turn_to(angle) * shaft.counter.resolution();
+            let turned = shaft.counter.turn_to(angle) * shaft.counter.resolution();
+            let counted = if counts(number) { turned } else { 0.0 };
             shaft.rounding = counted - (angle - shaft.last);
             shaft.last = angle;
         }

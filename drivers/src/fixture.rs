@@ -51,6 +51,7 @@ pub(crate) fn build(
                 .ok_or_else(|| BuildError::at("model", format!("no {path}")))
         },
         load_runs: &|_, _| Ok(runs.to_vec()),
+        read_column: &|path, _| Err(BuildError::at("path", format!("no {path}"))),
     })
 }
 

@@ -10,6 +10,8 @@
 mod batch;
 #[cfg(feature = "std")]
 mod encoder;
+#[cfg(feature = "std")]
+mod fault;
 #[cfg(test)]
 #[cfg(feature = "std")]
 mod fixture;
@@ -24,6 +26,8 @@ mod simulated;
 pub use batch::simulate_inputs;
 #[cfg(feature = "std")]
 pub use encoder::Counter;
+#[cfg(feature = "std")]
+pub use fault::SensorFault;
 #[cfg(feature = "std")]
 pub use replay::Replay;
 #[cfg(feature = "std")]

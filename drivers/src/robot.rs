@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::encoder::Encoders;
+use crate::fault::Faults;
 use crate::simulated::{Limit, Simulated};
 
 /// Step of the robot where the file gives none, s.
@@ -24,6 +25,9 @@ pub(crate) struct Robot {
     /// Largest magnitude per input.
     limits: Vec<f64>,
     random: ChaCha8Rng,
+    faults: Faults,
+    /// What was measured last, for signals that freeze.
+    before: Vec<f64>,
     read_at: f64,
 }
 
@@ -60,13 +64,17 @@ impl Robot {
         // Noise has a stream of its own: whether counts are rounded does not change it.
         random.set_stream(1);
         random.set_word_pos(0);
+        let ids: Vec<&str> = model.measured.iter().map(|m| m.signal.id).collect();
+        let faults = Faults::new(&settings.fault, &encoders.shafts(), &ids, settings.seed)?;
         let values = model.values();
         let mut robot = Self {
+            before: vec![0.0; model.measured.len()],
             simulator: Simulator::owning(model, &values),
             encoders,
             noise,
             limits,
             random,
+            faults,
             read_at: 0.0,
         };
         robot.encoders.start(robot.simulator.signals());
@@ -94,7 +102,10 @@ impl Robot {
         let period = simulator.time() - self.read_at;
         self.read_at = simulator.time();
         if period > 0.0 {
-            self.encoders.count(simulator.signals(), period, measured);
+            let (time, faults) = (self.read_at, &self.faults);
+            let counts = |shaft| faults.counts(shaft, time);
+            self.encoders
+                .count(simulator.signals(), period, measured, counts);
         }
         for (value, deviation) in measured.iter_mut().zip(&self.noise) {
             if *deviation > 0.0 {
@@ -102,7 +113,18 @@ impl Robot {
                 *value += *deviation * normal;
             }
         }
+        for (signal, (value, before)) in measured.iter_mut().zip(&mut self.before).enumerate() {
+            if self.faults.freezes(signal, self.read_at) {
+                *value = *before;
+            }
+            *before = *value;
+        }
         finite
+    }
+
+    /// Whether the sample just measured gets lost on its way; to be asked once for each.
+    pub(crate) fn loses(&mut self) -> bool {
+        self.faults.lose(self.read_at)
     }
 }
 

@@ -10,6 +10,7 @@ use loopsight_core::sensor::Sensor;
 use loopsight_core::{Driver, DriverFault, Sample, declare_part};
 use serde::{Deserialize, Serialize};
 
+use crate::fault::SensorFault;
 use crate::robot::{Robot, unknown};
 
 /// A model as the robot: the loop's own, or another one that hides what the loop's lacks.
@@ -36,6 +37,9 @@ use crate::robot::{Robot, unknown};
 /// so their roundings are correlated as on a robot. The first reading has no interval before it
 /// and is the instantaneous value: 0 of a robot at rest.
 ///
+/// Faults of the sensors are listed in `fault`, see [`SensorFault`]; a lost sample is replaced by the one
+/// before it, and is not fresh.
+///
 /// A command that is not finite is rejected, and the robot goes on with its inputs at 0.
 ///
 /// Reference: Hairer, Nørsett, Wanner (1993), "Solving Ordinary Differential Equations I", 2nd
@@ -59,6 +63,9 @@ pub struct Simulated {
     pub limit: Option<Limit>,
     /// Whether encoders count, as the model's sensors say; else they give the exact mean.
     pub quantize: bool,
+    /// What goes wrong with the sensors, and when.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fault: Vec<SensorFault>,
 }
 
 impl Default for Simulated {
@@ -70,6 +77,7 @@ impl Default for Simulated {
             seed: 1,
             limit: None,
             quantize: true,
+            fault: Vec::new(),
         }
     }
 }
@@ -126,6 +134,11 @@ pub(crate) const META: PartMeta = PartMeta {
             "",
             "whether encoders count, as the model's sensors say; default: true",
         ),
+        Setting::new(
+            "fault",
+            "",
+            "list of sensor faults, each `dead_encoder = { of, start_s, duration_s }`, `frozen = { signal, start_s, duration_s }` or `stale = { share, start_s, duration_s }`; default: none",
+        ),
     ],
 };
 
@@ -157,6 +170,8 @@ impl DriverPart for Simulated {
             period: context.period,
             readings: 0,
             input: vec![0.0; input_at.len()],
+            taken: 0.0,
+            held: vec![0.0; measured_at.len()],
             measured: vec![0.0; measured_at.len()],
             measured_at,
             input_at,
@@ -222,6 +237,9 @@ struct SimulatedDriver {
     /// Applied inputs and last measurement, in the robot's order.
     input: Vec<f64>,
     measured: Vec<f64>,
+    /// The sample that was handed out last: when it was taken, and its values.
+    taken: f64,
+    held: Vec<f64>,
     measured_at: Vec<usize>,
     input_at: Vec<usize>,
 }
@@ -247,11 +265,20 @@ impl Driver<f64> for SimulatedDriver {
         }
         self.readings += 1;
         let finite = self.robot.measure(&mut self.measured);
-        for (to, at) in measured.iter_mut().zip(&self.measured_at) {
-            *to = self.measured[*at];
+        // The first sample has none before it that could be handed out in its place.
+        let fresh = !self.robot.loses() || time == 0.0;
+        if fresh {
+            self.taken = time;
+            for (to, at) in self.held.iter_mut().zip(&self.measured_at) {
+                *to = self.measured[*at];
+            }
         }
+        measured.copy_from_slice(&self.held);
         if finite {
-            Ok(Sample { time, fresh: true })
+            Ok(Sample {
+                time: self.taken,
+                fresh,
+            })
         } else {
             Err(HostDriverError {
                 fault: DriverFault::Io,
@@ -315,7 +342,8 @@ mod tests {
         let read = |text: &str| Source::parse("loop.toml", text).unwrap().read::<File>();
         assert_eq!(read(META.example).unwrap().driver.meta().id, "simulated");
         let all = "[driver.simulated]\nmodel = \"robot.toml\"\nstep_s = 1e-4\nseed = 3\n\
-                   noise = { linear_velocity = 0.001 }\nlimit = { voltage_left = 12.0 }\nquantize = false\n";
+                   noise = { linear_velocity = 0.001 }\nlimit = { voltage_left = 12.0 }\nquantize = false\n\
+                   fault = [{ stale = { share = 0.05 } }]\n";
         assert!(read(all).unwrap().driver.is_simulated());
         let wrong = "[driver.simulated]\nlimit = \"12 V\"\n";
         let error = read(wrong).unwrap_err();

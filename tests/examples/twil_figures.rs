@@ -226,6 +226,12 @@ fn drive(path: &Path, robot: Option<Box<dyn DriverPart>>) -> Outcome<Driven> {
                 .map_err(|e| BuildError::at("model", e.to_string()))
         },
         load_runs: &|_, _| Err(BuildError::at("recording", "nothing is replayed here")),
+        read_column: &|_, _| {
+            Err(BuildError::at(
+                "path",
+                "no reference comes from a file here",
+            ))
+        },
     };
     let mut composed = file.compose(&source, &model, &context)?;
     let n = composed.controlled.len();

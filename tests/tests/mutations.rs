@@ -187,6 +187,7 @@ fn damaged_loops_never_panic() {
                 period: file.period_s,
                 load_model: &load_model,
                 load_runs: &load_runs,
+                read_column: &|path, _| Err(BuildError::at("path", format!("no {path}"))),
             };
             let Ok(mut composed) = file.compose(&source, &model, &context) else {
                 return true;

@@ -12,7 +12,7 @@ use std::fmt::Debug;
 use loopsight_controllers::{FeedbackLinearizingPiSettings, PerChannel, Rule};
 use loopsight_core::Parameter;
 use loopsight_core::config::Source;
-use loopsight_core::excitation::Excitation;
+use loopsight_core::excitation::{Between, Excitation};
 use loopsight_core::loop_file::LoopFile;
 use loopsight_core::model::{FitOptions, Model, ModelFile, SimulationOptions, misfit};
 use loopsight_core::registry::{ControllerPart, DriverPart, EstimatorPart, effects, parts, plants};
@@ -190,8 +190,25 @@ fn seed() -> std::ops::RangeInclusive<u64> {
 
 fn excitation() -> impl Strategy<Value = Excitation> {
     let random = (finite(), finite(), seed(), any::<bool>(), 2u32..);
+    let between = prop_oneof![
+        Just(Between::Held),
+        Just(Between::Straight),
+        Just(Between::Smooth)
+    ];
     let leaf = prop_oneof![
         finite().prop_map(Excitation::Constant),
+        (
+            vec(proptest::array::uniform2(finite()), 0..5),
+            between.clone()
+        )
+            .prop_map(|(at, between)| Excitation::Waypoints { at, between }),
+        (proptest::option::of("[a-z]{1,4}"), between).prop_map(|(column, between)| {
+            Excitation::File {
+                path: "wave.csv".into(),
+                column,
+                between,
+            }
+        }),
         vec(proptest::array::uniform2(finite()), 0..5).prop_map(|at| Excitation::Steps { at }),
         (finite(), finite(), finite(), finite()).prop_map(|(from, to, start_s, duration_s)| {
             Excitation::Ramp {

@@ -175,6 +175,7 @@ pub(crate) fn compose(
         period: file.period_s,
         load_model: &load_model,
         load_runs: &load_runs,
+        read_column: &|name, column| load::column(&beside(path, name), column),
     };
     let composed = file.compose(source, &model, &context)?;
     Ok((model, composed))

@@ -14,7 +14,7 @@ use serde::Deserialize;
 
 use crate::arguments::SimulateOptions;
 use crate::failure::{self, Failure};
-use crate::load::writable;
+use crate::load::{column as column_of, writable};
 use crate::output;
 
 /// An experiment file: what a robot is driven with and how it is measured.
@@ -77,7 +77,10 @@ impl Experiment {
         let rows = match &self.inputs_from {
             Some(name) => replayed(source, name, model, &time)?,
             None => {
-                let inputs = excitation::build(&self.inputs, model.plant.inputs)
+                let beside = Path::new(&source.file);
+                let read =
+                    |name: &str, column: &str| column_of(&beside.with_file_name(name), column);
+                let inputs = excitation::build_with(&self.inputs, model.plant.inputs, &read)
                     .map_err(|e| placed(source, &["inputs".into()], e))?;
                 sample_rows(&inputs, &time)
             }

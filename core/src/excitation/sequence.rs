@@ -6,10 +6,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::Excitation;
+use super::points::Points;
 
 /// A value is due this much (relative to the hold time) before its time: sampling instants are
 /// sums of rounded periods.
-const EARLY: f64 = 1e-9;
+pub(super) const EARLY: f64 = 1e-9;
 
 /// An excitation that was checked, ready to be sampled.
 #[derive(Clone, Debug)]
@@ -19,6 +20,9 @@ pub struct Sequence(pub(super) Kind);
 pub(super) enum Kind {
     /// Needs nothing but what the file says.
     Plain(Excitation),
+    /// `[time, value]`: the value of the last one that has come, 0 before the first.
+    Steps(Vec<[f64; 2]>),
+    Points(Points),
     /// `amplitude (2 j/(levels - 1) - 1)`, `j` drawn anew every `hold` s.
     Random {
         amplitude: f64,
@@ -58,6 +62,12 @@ impl Sequence {
     pub fn sample(&self, t: f64) -> f64 {
         match &self.0 {
             Kind::Plain(plain) => plain_sample(plain, t),
+            Kind::Steps(at) => {
+                let due = t + EARLY * t.abs().max(1.0);
+                let come = at.partition_point(|[time, _]| *time <= due);
+                come.checked_sub(1).map_or(0.0, |last| at[last][1])
+            }
+            Kind::Points(points) => points.sample(t),
             Kind::Random {
                 amplitude,
                 hold,
@@ -78,11 +88,6 @@ impl Sequence {
 fn plain_sample(of: &Excitation, t: f64) -> f64 {
     match of {
         Excitation::Constant(value) => *value,
-        Excitation::Steps { at } => {
-            let due = t + EARLY * t.abs().max(1.0);
-            let come = at.partition_point(|[time, _]| *time <= due);
-            come.checked_sub(1).map_or(0.0, |last| at[last][1])
-        }
         Excitation::Ramp {
             from,
             to,
@@ -107,7 +112,12 @@ fn plain_sample(of: &Excitation, t: f64) -> f64 {
             amplitude * (TAU * turns).sin()
         }
         // `build` turns these into kinds of their own.
-        Excitation::Prbs { .. } | Excitation::MultiLevel { .. } | Excitation::Sum(_) => 0.0,
+        Excitation::Steps { .. }
+        | Excitation::Prbs { .. }
+        | Excitation::MultiLevel { .. }
+        | Excitation::Waypoints { .. }
+        | Excitation::File { .. }
+        | Excitation::Sum(_) => 0.0,
     }
 }
 

@@ -51,6 +51,7 @@ fn estimators_controllers_and_drivers_keep_their_word() {
         period: 0.01,
         load_model: &load_model,
         load_runs: &load_runs,
+        read_column: &|path, _| Err(BuildError::at("path", format!("no {path}"))),
     };
     for meta in parts() {
         let of = says_what_it_takes(meta);
