@@ -25,6 +25,8 @@ pub struct Identification {
     regression: Regression,
     estimators: Vec<Box<dyn Estimator<f64>>>,
     innovations: Vec<Option<Innovation<f64>>>,
+    /// As long as the longest regressor: where an estimator starts over.
+    start: Vec<f64>,
 }
 
 /// Why identification cannot be set up.
@@ -58,8 +60,11 @@ impl Identification {
             estimators.push(part.build(&start)?);
         }
         let innovations = vec![None; estimators.len()];
+        let lengths = (0..regression.len()).map(|row| regression.parameters(row).len());
+        let longest = lengths.max().unwrap_or(0);
         Ok(Self {
             settings: settings.clone(),
+            start: vec![0.0; longest],
             regression,
             estimators,
             innovations,
@@ -118,6 +123,28 @@ impl Observer<f64> for Identification {
             for (parameter, value) in parameters.iter().zip(estimator.theta()) {
                 model.learn(*parameter, *value);
             }
+        }
+    }
+
+    fn innovation(&self, row: usize) -> Option<Innovation<f64>> {
+        *self.innovations.get(row)?
+    }
+
+    fn residual(&self, row: usize, values: &[f64]) -> Option<f64> {
+        self.innovation(row)?;
+        let (phi, y) = self.regression.row(row);
+        let parameters = self.regression.parameters(row).iter().zip(phi);
+        let explained = parameters.map(|(j, phi)| phi * values.get(*j).unwrap_or(&f64::NAN));
+        Some(y - explained.sum::<f64>())
+    }
+
+    fn restart(&mut self, values: &[f64]) {
+        for (row, estimator) in self.estimators.iter_mut().enumerate() {
+            let parameters = self.regression.parameters(row);
+            for (to, j) in self.start.iter_mut().zip(parameters) {
+                *to = values.get(*j).copied().unwrap_or(0.0);
+            }
+            estimator.reset(&self.start[..parameters.len()]);
         }
     }
 }

@@ -23,10 +23,12 @@ mod dual;
 mod effect;
 mod estimator;
 mod integrator;
+pub mod limits;
 mod parameter;
 mod plant;
 mod real;
 mod signal;
+pub mod supervisor;
 mod tick;
 pub mod unit;
 
@@ -73,6 +75,7 @@ pub use dual::{DUAL_WIDTH, Dual, derivative, variable};
 pub use effect::{Effect, EffectMeta, NoPast, Past, Physics, Reading};
 pub use estimator::{Estimator, Innovation};
 pub use integrator::{Rk4, rk4_step, substeps};
+pub use limits::Limits;
 pub use parameter::Parameter;
 #[doc(hidden)]
 pub use plant::check_sizes as plant_check;

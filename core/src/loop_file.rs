@@ -7,11 +7,13 @@ use serde::{Deserialize, Serialize};
 use crate::config::{ConfigError, Source, Step};
 use crate::excitation::{self, Excitation, Sequence};
 use crate::identification::{Identification, IdentificationError, LearningSettings};
+use crate::limits::{self, LimitSettings};
 use crate::model::{Affine, Model};
 use crate::registry::{
     BuildError, ControllerPart, DriverContext, DriverPart, EstimatorPart, HostDriver,
 };
 use crate::regression::Scheme;
+use crate::supervisor::{Supervisor, SupervisorSettings};
 use crate::{Clock, Controller, Loop, Signal, SimulatedClock, SystemClock};
 
 /// A loop file, as written.
@@ -47,6 +49,12 @@ pub struct LoopFile {
     /// References of the controlled signals; 0 where none is given.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub reference: BTreeMap<String, Excitation>,
+    /// Limits of inputs and of the controlled signals' references, by signal.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub limits: LimitSettings,
+    /// What watches over the loop, if anything.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supervisor: Option<SupervisorSettings>,
     /// Where the log is written, relative to the loop file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
@@ -61,6 +69,7 @@ pub type HostLoop = Loop<
     Option<Identification>,
     Box<dyn Clock>,
     Vec<f64>,
+    Option<Supervisor<f64, Vec<f64>>>,
 >;
 
 /// A composed loop with what its references and titles need.
@@ -171,13 +180,25 @@ impl LoopFile {
                 )
             }
         };
+        let (input_limits, reference_limits) =
+            limits::build(&self.limits, model.plant.inputs, &signals)
+                .map_err(|e| placed(source, &["limits".into()], e))?;
+        let rows = identification.as_ref().map_or(0, Identification::len);
+        let supervisor = match &self.supervisor {
+            None => None,
+            Some(settings) => Some(
+                settings
+                    .build(model, rows)
+                    .map_err(|e| placed(source, &["supervisor".into()], e))?,
+            ),
+        };
         let clock: Box<dyn Clock> = if self.driver.is_simulated() && !self.real_time {
             Box::new(SimulatedClock::default())
         } else {
             Box::new(SystemClock::default())
         };
         let nu = model.plant.inputs.len();
-        let host = Loop::new(
+        let mut host = Loop::new(
             driver,
             controller,
             affine,
@@ -188,7 +209,10 @@ impl LoopFile {
             vec![0.0; nu],
             vec![0.0; nu],
             vec![0.0; controlled.len()],
-        );
+        )
+        .supervised(supervisor);
+        host.input_limits = input_limits;
+        host.reference_limits = reference_limits;
         Ok(Composed {
             host,
             controlled,

@@ -1,7 +1,10 @@
 //! The loop: read, identify, control, write, once per period.
 
 use crate::controller::AffineModel;
-use crate::{Clock, Command, ControlError, Controller, Driver, DriverError, Real, Sample};
+use crate::supervisor::{Action, Event, Supervise};
+use crate::{
+    Clock, Command, ControlError, Controller, Driver, DriverError, Innovation, Limits, Real, Sample,
+};
 
 /// Where in time a controller is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +48,24 @@ pub trait Observer<S: Real> {
     fn teach(&self, model: &mut dyn AffineModel<S>) {
         let _ = model;
     }
+
+    /// What the last observation told the `row`-th regression that was not expected; `None` where
+    /// there was nothing to learn, or no such regression.
+    fn innovation(&self, row: usize) -> Option<Innovation<S>> {
+        let _ = row;
+        None
+    }
+
+    /// What other values of the model's parameters would have left unexplained of the same.
+    fn residual(&self, row: usize, values: &[S]) -> Option<S> {
+        let _ = (row, values);
+        None
+    }
+
+    /// Starts over from these values of the model's parameters.
+    fn restart(&mut self, values: &[S]) {
+        let _ = values;
+    }
 }
 
 impl<S: Real> Observer<S> for () {
@@ -63,18 +84,34 @@ impl<S: Real, O: Observer<S>> Observer<S> for Option<O> {
             observer.teach(model);
         }
     }
+
+    fn innovation(&self, row: usize) -> Option<Innovation<S>> {
+        self.as_ref().and_then(|o| o.innovation(row))
+    }
+
+    fn residual(&self, row: usize, values: &[S]) -> Option<S> {
+        self.as_ref().and_then(|o| o.residual(row, values))
+    }
+
+    fn restart(&mut self, values: &[S]) {
+        if let Some(observer) = self {
+            observer.restart(values);
+        }
+    }
 }
 
 /// Why a loop ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TickError<E> {
+pub enum TickError<E, S = f64> {
     /// The driver failed or finished.
     Driver(E),
     /// The controller could not compute a command.
     Control(ControlError),
+    /// The supervisor stopped the loop.
+    Supervisor(Event<S>),
 }
 
-impl<E: DriverError> TickError<E> {
+impl<E: DriverError, S> TickError<E, S> {
     /// True when the run simply came to its end.
     pub fn is_end(&self) -> bool {
         matches!(self, TickError::Driver(e) if e.kind() == crate::DriverFault::Finished)
@@ -84,10 +121,10 @@ impl<E: DriverError> TickError<E> {
 /// A control loop composed of a driver, a controller, a model of the plant, an observer that
 /// learns, and a clock.
 ///
-/// `B` is the buffer type: `[S; N]` without an allocator, `Vec<S>` on a host. The loop allocates
-/// nothing after it was built.
+/// `B` is the buffer type: `[S; N]` without an allocator, `Vec<S>` on a host. `W` watches over it: a
+/// [`Supervisor`](crate::supervisor::Supervisor), or nobody. The loop allocates nothing after it was built.
 #[derive(Debug)]
-pub struct Loop<S, D, C, M, O, K, B> {
+pub struct Loop<S, D, C, M, O, K, B, W = ()> {
     /// What stands between the loop and the robot.
     pub driver: D,
     /// The control law.
@@ -98,11 +135,19 @@ pub struct Loop<S, D, C, M, O, K, B> {
     pub observer: O,
     /// Simulated or real time.
     pub clock: K,
+    /// Decides whether what was learned is used, and stops the loop.
+    pub supervisor: W,
+    /// Limits of the references of the controlled signals.
+    pub reference_limits: Option<Limits<B>>,
+    /// Limits of the inputs, between controller and driver.
+    pub input_limits: Option<Limits<B>>,
     period: f64,
     index: u64,
+    reference: B,
     controlled: B,
     measured: B,
     command: B,
+    limited: B,
     applied: B,
     outcome: Command,
     marker: core::marker::PhantomData<S>,
@@ -115,28 +160,28 @@ pub struct Step<'a, S> {
     pub tick: Tick<S>,
     /// How old the measurement is.
     pub sample: Sample<S>,
+    /// What the controlled signals should be, within the limits.
+    pub reference: &'a [S],
     /// Everything the driver measured.
     pub measured: &'a [S],
     /// What the controller asked for.
     pub command: &'a [S],
     /// What the driver applied.
     pub applied: &'a [S],
-    /// What the controller says of it.
+    /// What the controller says of it; saturated also where the loop's own limits held an input.
     pub outcome: Command,
+    /// What the supervisor did at this tick.
+    pub event: Option<Event<S>>,
+    /// The controller has the last good model instead of the learned one.
+    pub fallen: bool,
 }
 
-/// When, how fresh the sample was, and what the controller says.
-type Advance<S> = (Tick<S>, Sample<S>, Command);
+/// When, how fresh the sample was, what the controller says, and what the supervisor did.
+type Advance<S> = (Tick<S>, Sample<S>, Command, Option<Event<S>>);
 
 impl<S, D, C, M, O, K, B> Loop<S, D, C, M, O, K, B>
 where
-    S: Real,
-    D: Driver<S>,
-    C: Controller<S>,
-    M: AffineModel<S>,
-    O: Observer<S>,
-    K: Clock,
-    B: AsRef<[S]> + AsMut<[S]>,
+    B: Clone,
 {
     /// Composes a loop. The first `reference.len()` measured signals are the controlled states;
     /// `measured`, `command` and `controlled` are buffers of the right lengths.
@@ -162,10 +207,15 @@ where
             model,
             observer,
             clock,
+            supervisor: (),
+            reference_limits: None,
+            input_limits: None,
             period,
             index: 0,
+            reference: controlled.clone(),
             controlled,
             measured,
+            limited: command.clone(),
             command,
             applied,
             outcome: Command::default(),
@@ -173,24 +223,63 @@ where
         }
     }
 
+    /// The same loop with a supervisor.
+    pub fn supervised<W>(self, supervisor: W) -> Loop<S, D, C, M, O, K, B, W> {
+        Loop {
+            driver: self.driver,
+            controller: self.controller,
+            model: self.model,
+            observer: self.observer,
+            clock: self.clock,
+            supervisor,
+            reference_limits: self.reference_limits,
+            input_limits: self.input_limits,
+            period: self.period,
+            index: self.index,
+            reference: self.reference,
+            controlled: self.controlled,
+            measured: self.measured,
+            command: self.command,
+            limited: self.limited,
+            applied: self.applied,
+            outcome: self.outcome,
+            marker: self.marker,
+        }
+    }
+}
+
+impl<S, D, C, M, O, K, B, W> Loop<S, D, C, M, O, K, B, W>
+where
+    S: Real,
+    D: Driver<S>,
+    C: Controller<S>,
+    M: AffineModel<S>,
+    O: Observer<S>,
+    K: Clock,
+    B: AsRef<[S]> + AsMut<[S]>,
+    W: Supervise<S>,
+{
     /// The loop's period, s.
     pub fn period(&self) -> f64 {
         self.period
     }
 
-    /// Waits for the next period, then reads, learns, teaches the model, controls and writes.
+    /// Waits for the next period, then reads, learns, judges and teaches, controls and writes.
     ///
     /// On any error the driver has been stopped safely when this returns.
-    pub fn tick(&mut self, reference: &[S]) -> Result<Step<'_, S>, TickError<D::Error>> {
+    pub fn tick(&mut self, reference: &[S]) -> Result<Step<'_, S>, TickError<D::Error, S>> {
         self.clock.wait_until(self.index as f64 * self.period);
         match self.advance(reference) {
-            Ok((tick, sample, outcome)) => Ok(Step {
+            Ok((tick, sample, outcome, event)) => Ok(Step {
                 tick,
                 sample,
+                reference: self.reference.as_ref(),
                 measured: self.measured.as_ref(),
                 command: self.command.as_ref(),
                 applied: self.applied.as_ref(),
                 outcome,
+                event,
+                fallen: self.supervisor.fallen(),
             }),
             Err(error) => {
                 // The first error is the one that matters; a failing stop cannot be helped here.
@@ -200,7 +289,7 @@ where
         }
     }
 
-    fn advance(&mut self, reference: &[S]) -> Result<Advance<S>, TickError<D::Error>> {
+    fn advance(&mut self, reference: &[S]) -> Result<Advance<S>, TickError<D::Error, S>> {
         let tick = Tick {
             index: self.index,
             time: S::of(self.index as f64 * self.period),
@@ -210,16 +299,32 @@ where
             .driver
             .read(self.measured.as_mut())
             .map_err(TickError::Driver)?;
+        for (to, from) in self.reference.as_mut().iter_mut().zip(reference) {
+            *to = *from;
+        }
+        if let Some(limits) = &mut self.reference_limits {
+            limits.hold(tick.period, self.reference.as_mut());
+        }
+        let mut event = None;
         if self.index > 0 {
-            self.observer.observe(&Observation {
+            let seen = Observation {
                 tick,
                 sample,
                 measured: self.measured.as_ref(),
                 command: self.command.as_ref(),
                 applied: self.applied.as_ref(),
                 outcome: self.outcome,
-            });
-            self.observer.teach(&mut self.model);
+            };
+            self.observer.observe(&seen);
+            event = self.supervisor.judge(
+                &seen,
+                self.reference.as_ref(),
+                &mut self.observer,
+                &mut self.model,
+            );
+            if let Some(event) = event.filter(|e| e.action == Action::Stopped) {
+                return Err(TickError::Supervisor(event));
+            }
         }
         let controlled = self.controlled.as_mut();
         for (to, from) in controlled.iter_mut().zip(self.measured.as_ref()) {
@@ -229,17 +334,26 @@ where
             .controller
             .step(
                 &tick,
-                reference,
+                self.reference.as_ref(),
                 controlled,
                 &mut self.model,
                 self.command.as_mut(),
             )
             .map_err(TickError::Control)?;
+        for (to, from) in self.limited.as_mut().iter_mut().zip(self.command.as_ref()) {
+            *to = *from;
+        }
+        if let Some(limits) = &mut self.input_limits {
+            self.outcome.saturated |= limits.hold(tick.period, self.limited.as_mut());
+        }
         self.driver
-            .write(self.command.as_ref(), self.applied.as_mut())
+            .write(self.limited.as_ref(), self.applied.as_mut())
             .map_err(TickError::Driver)?;
+        if let Some(limits) = &mut self.input_limits {
+            limits.start(self.applied.as_ref());
+        }
         self.index += 1;
-        Ok((tick, sample, self.outcome))
+        Ok((tick, sample, self.outcome, event))
     }
 
     /// Brings the actuators to rest.

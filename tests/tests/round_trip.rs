@@ -13,13 +13,16 @@ use loopsight_controllers::{FeedbackLinearizingPiSettings, PerChannel, Rule};
 use loopsight_core::Parameter;
 use loopsight_core::config::Source;
 use loopsight_core::excitation::{Between, Excitation};
+use loopsight_core::identification::LearningSettings;
+use loopsight_core::limits::SignalLimits;
 use loopsight_core::loop_file::LoopFile;
 use loopsight_core::model::{FitOptions, Model, ModelFile, SimulationOptions, misfit};
 use loopsight_core::registry::{ControllerPart, DriverPart, EstimatorPart, effects, parts, plants};
 use loopsight_core::regression::Scheme;
 use loopsight_core::run::{Column, ColumnMap, Hold, LogMap, Measured};
 use loopsight_core::sensor::{Encoder, Sensor};
-use loopsight_drivers::{Limit, Replay, Simulated};
+use loopsight_core::supervisor::SupervisorSettings;
+use loopsight_drivers::{Limit, Replay, SensorFault, Simulated};
 use loopsight_estimators::RlsSettings;
 use loopsight_plants as _;
 use loopsight_tests as _;
@@ -404,14 +407,69 @@ fn simulated() -> impl Strategy<Value = Simulated> {
         seed(),
         limit,
         any::<bool>(),
+        vec(fault(), 0..3),
     )
-        .prop_map(|(model, step_s, noise, seed, limit, quantize)| Simulated {
-            model,
-            step_s,
-            noise,
-            seed,
-            limit,
-            quantize,
+        .prop_map(
+            |(model, step_s, noise, seed, limit, quantize, fault)| Simulated {
+                model,
+                step_s,
+                noise,
+                seed,
+                limit,
+                quantize,
+                fault,
+            },
+        )
+}
+
+fn fault() -> impl Strategy<Value = SensorFault> {
+    let span = (finite(), option::of(finite()));
+    prop_oneof![
+        (option::of(name()), span.clone()).prop_map(|(of, (start_s, duration_s))| {
+            SensorFault::DeadEncoder {
+                of,
+                start_s,
+                duration_s,
+            }
+        }),
+        (name(), span.clone()).prop_map(|(signal, (start_s, duration_s))| SensorFault::Frozen {
+            signal,
+            start_s,
+            duration_s,
+        }),
+        (finite(), span).prop_map(|(share, (start_s, duration_s))| SensorFault::Stale {
+            share,
+            start_s,
+            duration_s,
+        }),
+    ]
+}
+
+fn limits() -> impl Strategy<Value = SignalLimits> {
+    (option::of(finite()), option::of(finite()))
+        .prop_map(|(magnitude, rate)| SignalLimits { magnitude, rate })
+}
+
+fn supervisor() -> impl Strategy<Value = SupervisorSettings> {
+    (
+        vec(finite(), 9),
+        btree_map(name(), finite(), 0..3),
+        btree_map(name(), proptest::array::uniform2(finite()), 0..3),
+        any::<u32>(),
+    )
+        .prop_map(|(numbers, tracking, range, falls)| SupervisorSettings {
+            window_s: numbers[0],
+            worse: numbers[1],
+            innovation: numbers[2],
+            innovation_s: numbers[3],
+            tracking,
+            tracking_share: numbers[4],
+            tracking_s: numbers[5],
+            range,
+            frozen_s: numbers[6],
+            stale_s: numbers[7],
+            calm_s: numbers[8],
+            falls,
         })
 }
 
@@ -435,7 +493,14 @@ proptest! {
         euler in any::<bool>(),
         reference in btree_map(name(), excitation(), 0..3),
         log in option::of(name()),
+        certainty_equivalence in option::of(any::<bool>()),
+        limits in btree_map(name(), limits(), 0..3),
+        supervisor in option::of(supervisor()),
     ) {
+        let learning = certainty_equivalence.map(|certainty_equivalence| LearningSettings {
+            certainty_equivalence,
+            ..LearningSettings::default()
+        });
         let (name, model, period_s, duration_s, real_time) = head;
         let file = LoopFile {
             name,
@@ -447,7 +512,10 @@ proptest! {
             controller: Box::new(controller),
             estimator: estimator.map(|part| Box::new(part) as Box<dyn EstimatorPart>),
             regression: if euler { Scheme::Euler } else { Scheme::Integrated },
+            learning,
             reference,
+            limits,
+            supervisor,
             log,
         };
         let written = toml::to_string(&file).unwrap();

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use loopsight_core::TickError;
 use loopsight_core::config::{Source, read_text};
 use loopsight_core::loop_file::{Composed, LoopFile};
 use loopsight_core::model::Model;
 use loopsight_core::registry::{BuildError, DriverContext};
+use loopsight_core::supervisor::{Event, described};
+use loopsight_core::{Signal, TickError};
 use loopsight_diagnosis::tracking::{StepResponse, step_responses};
 use loopsight_recordings::{LogWriter, header};
 use loopsight_report::{
@@ -220,7 +221,7 @@ fn drive(
         }
         match composed.host.tick(&reference) {
             Ok(step) => {
-                recorder.push(time, &reference, &step);
+                recorder.push(time, &step);
                 if let Some(log) = log.as_mut() {
                     log.write(recorder.row())
                         .map_err(|e| Failure::work(e.to_string()))?;
@@ -232,6 +233,11 @@ fn drive(
                     text: match &error {
                         TickError::Driver(e) => e.to_string(),
                         TickError::Control(e) => e.to_string(),
+                        TickError::Supervisor(event) => {
+                            let text = recorder.words(event);
+                            recorder.happened(time, text.clone());
+                            text
+                        }
                     },
                 };
                 break;
@@ -271,7 +277,11 @@ struct Recorder {
     record: LoopRecord,
     row: Vec<f64>,
     names: Vec<Vec<usize>>,
+    signals: Vec<Signal>,
 }
+
+/// Most events that are kept of a run.
+const MOST_EVENTS: usize = 1000;
 
 impl Recorder {
     fn new(model: &Model, composed: &Composed, period: f64, duration: Option<f64>) -> Self {
@@ -335,11 +345,28 @@ impl Recorder {
                 ..LoopRecord::default()
             },
             row: Vec::new(),
+            signals: model.measured.iter().map(|m| *m.signal).collect(),
             names,
         }
     }
 
-    fn push(&mut self, time: f64, reference: &[f64], step: &loopsight_core::Step<'_, f64>) {
+    /// What a supervisor did, in words.
+    fn words(&self, event: &Event<f64>) -> String {
+        let signals = self.signals.iter().map(|s| (s.id, s.unit));
+        described(event, &signals.collect::<Vec<_>>())
+    }
+
+    fn happened(&mut self, time: f64, text: String) {
+        if self.record.events.len() < MOST_EVENTS {
+            self.record.events.push((time, text));
+        }
+    }
+
+    fn push(&mut self, time: f64, step: &loopsight_core::Step<'_, f64>) {
+        if let Some(event) = &step.event {
+            self.happened(time, self.words(event));
+        }
+        let reference = step.reference;
         let record = &mut self.record;
         record.time.push(time);
         for (i, trace) in record.controlled.iter_mut().enumerate() {
@@ -352,15 +379,11 @@ impl Recorder {
         }
         let was = record.saturated.last().copied().unwrap_or(false);
         record.saturated.push(step.outcome.saturated);
-        if step.outcome.saturated && !was && record.events.len() < 1000 {
-            record
-                .events
-                .push((time, "an actuator saturates".to_owned()));
+        if step.outcome.saturated && !was {
+            self.happened(time, "an actuator saturates".to_owned());
         }
-        if step.outcome.held && record.events.len() < 1000 {
-            record
-                .events
-                .push((time, "the last safe command is held".to_owned()));
+        if step.outcome.held {
+            self.happened(time, "the last safe command is held".to_owned());
         }
         self.row.clear();
         self.row.push((time * 1e9).round() / 1e9);

@@ -1,0 +1,312 @@
+//! The supervisor in motion.
+
+use super::models::Models;
+use super::{Action, Cause, Event, Supervise};
+use crate::{AffineModel, Observation, Observer, Real};
+
+/// A relapse counts for this long, s.
+const REMEMBERED: f64 = 60.0;
+
+/// Change, relative to the signal and its reference, below which a signal keeps its value.
+const STILL: f64 = 1e-6;
+
+/// When a supervisor acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thresholds<S> {
+    /// Window over which predictions are judged, s.
+    pub window: S,
+    /// Times worse than the last good model at which the learned one is left.
+    pub worse: S,
+    /// Times its usual size at which an innovation says that no model is right.
+    pub innovation: S,
+    /// How long that may last, s.
+    pub innovation_for: S,
+    /// Largest tracking error where no limit is given, as a share of the largest reference so far.
+    pub tracking_share: S,
+    /// How long a tracking error may be beyond its limit, s.
+    pub tracking_for: S,
+    /// How long a signal that should move may keep one value, s.
+    pub frozen: S,
+    /// How long there may be no fresh sample, s.
+    pub stale: S,
+    /// How long the learned model must have been good before it is handed over, s.
+    pub calm: S,
+    /// How often in a minute the learned model may be left before the loop stops.
+    pub falls: u32,
+}
+
+/// Watches over a loop that learns: the learned model has to predict as well as the last good one.
+///
+/// ```text
+/// E <- E + (T/τ)(e² - E),   G <- G + (T/τ)(g² - G)        e = y - φ·θ learned,  g = y - φ·θ good
+/// left:      √(E/G) > worse                               handed over: E ≤ G for `calm`
+/// stopped:   √(min(E, G)/U) > innovation for `innovation_for`     U: mean of min(E, G) over 20 τ
+///            |r - y| > limit for `tracking_for`, once the good model is in place
+/// ```
+///
+/// | symbol | what | unit |
+/// |---|---|---|
+/// | `e`, `g` | what the learned and the last good model leave unexplained | of the regression |
+/// | `T`, `τ` | period, window | s |
+/// | `r`, `y` | reference, measurement | of the signal |
+///
+/// A learned model is handed to the controller only after it has predicted no worse than the model
+/// file for a while; from then on it becomes the good one whenever it has been no worse for as
+/// long. Where it predicts worse, or the loop does not track, the controller gets the last good
+/// model back and the observer starts again from it. If that does not help, if no sample comes, if
+/// a signal freezes or leaves its range, or if no model explains what is measured, the loop stops.
+/// Two models whose innovations differ by less than a hundredth of the measured rates predict alike;
+/// an innovation below three tenths of them is not unusual.
+///
+/// Nothing is allocated after construction; `B` is the buffer type, as in [`crate::Loop`].
+///
+/// Reference: K. S. Narendra, J. Balakrishnan (1997), "Adaptive control using multiple models",
+/// IEEE Transactions on Automatic Control 42(2), 171–187, (6): models compared by their errors over
+/// a window; J. P. Hespanha, D. Liberzon, A. S. Morse (2003), "Hysteresis-based switching algorithms
+/// for supervisory control of uncertain systems", Automatica 39(2), 263–272.
+#[derive(Clone, Debug)]
+pub struct Supervisor<S, B> {
+    thresholds: Thresholds<S>,
+    models: Models<S, B>,
+    /// Largest tracking error by controlled signal; infinite: the share of the reference.
+    tracking: B,
+    low: B,
+    high: B,
+    largest_reference: B,
+    off_for: B,
+    frozen_for: B,
+    last: B,
+    reference: B,
+    stale_for: S,
+    unusual_for: S,
+    calm_for: S,
+    fallen_since: S,
+    fallen: bool,
+    /// Handed over at least once: what is left from now on is left for a reason.
+    proved: bool,
+    falls: u32,
+    now: S,
+}
+
+impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
+    /// A supervisor for a model with parameters `values` and `rows` regressions. `tracking` has a
+    /// limit per controlled signal, `range` the least and greatest values of the measured ones
+    /// (infinite: none). Buffers of a given length or longer come from `zeros`.
+    pub fn new(
+        thresholds: Thresholds<S>,
+        values: B,
+        rows: usize,
+        tracking: B,
+        range: (B, B),
+        zeros: impl Fn(usize) -> B,
+    ) -> Self {
+        let n = tracking.as_ref().len();
+        Self {
+            thresholds,
+            models: Models::new(values, rows, &zeros),
+            largest_reference: zeros(n),
+            off_for: zeros(n),
+            frozen_for: zeros(n),
+            last: zeros(n),
+            reference: zeros(n),
+            tracking,
+            low: range.0,
+            high: range.1,
+            stale_for: S::zero(),
+            unusual_for: S::zero(),
+            calm_for: S::zero(),
+            fallen_since: S::zero(),
+            fallen: true,
+            proved: false,
+            falls: 0,
+            now: S::zero(),
+        }
+    }
+
+    /// What the measurements alone say: nothing fresh, out of range, frozen.
+    fn sensors(&mut self, seen: &Observation<'_, S>) -> Option<Event<S>> {
+        let period = seen.tick.period;
+        let usable = seen.sample.fresh && seen.measured.iter().all(|y| y.is_finite());
+        if !usable {
+            self.stale_for += period;
+            return over(self.stale_for, self.thresholds.stale, Cause::Stale);
+        }
+        self.stale_for = S::zero();
+        let range = self.low.as_ref().iter().zip(self.high.as_ref());
+        for (i, (y, (low, high))) in seen.measured.iter().zip(range).enumerate() {
+            if y < low || y > high {
+                let limit = if y < low { *low } else { *high };
+                return Some(stopped(Cause::Range(i), *y, limit));
+            }
+        }
+        for i in 0..self.last.as_ref().len() {
+            let (Some(y), Some(r)) = (seen.measured.get(i), self.reference.as_ref().get(i)) else {
+                continue;
+            };
+            let stands = (*y - self.last.as_ref()[i]).abs() <= (y.abs() + r.abs()) * S::of(STILL);
+            let should = (*r - *y).abs() > r.abs() * S::of(0.5);
+            self.last.as_mut()[i] = *y;
+            let clock = &mut self.frozen_for.as_mut()[i];
+            *clock = if stands && should {
+                *clock + period
+            } else {
+                S::zero()
+            };
+            if let Some(event) = over(*clock, self.thresholds.frozen, Cause::Frozen(i)) {
+                return Some(event);
+            }
+        }
+        None
+    }
+
+    /// The tracking error that has been too large for too long, if any.
+    fn off_track(&mut self, seen: &Observation<'_, S>, reference: &[S]) -> Option<(Cause, S, S)> {
+        let mut found = None;
+        for (i, r) in reference
+            .iter()
+            .enumerate()
+            .take(self.tracking.as_ref().len())
+        {
+            let Some(y) = seen.measured.get(i) else {
+                continue;
+            };
+            let largest = &mut self.largest_reference.as_mut()[i];
+            *largest = largest.larger(r.abs());
+            let given = self.tracking.as_ref()[i];
+            let limit = if given.is_finite() {
+                given
+            } else {
+                self.thresholds.tracking_share * *largest
+            };
+            let error = (*r - *y).abs();
+            let clock = &mut self.off_for.as_mut()[i];
+            *clock = if error > limit && limit > S::zero() {
+                *clock + seen.tick.period
+            } else {
+                (*clock - seen.tick.period).larger(S::zero())
+            };
+            if *clock > self.thresholds.tracking_for && found.is_none() {
+                found = Some((Cause::Tracking(i), error, limit));
+            }
+        }
+        found
+    }
+
+    fn fall_back(
+        &mut self,
+        (cause, value, limit): (Cause, S, S),
+        observer: &mut dyn Observer<S>,
+        model: &mut dyn AffineModel<S>,
+    ) -> Event<S> {
+        let most = self.thresholds.falls;
+        self.falls += 1;
+        if self.falls > most {
+            let times = S::of(f64::from(self.falls));
+            return stopped(Cause::Relapse, times, S::of(f64::from(most)));
+        }
+        self.models.restore(observer, model);
+        self.fallen = true;
+        self.fallen_since = self.now;
+        self.calm_for = S::zero();
+        self.off_for.as_mut().fill(S::zero());
+        Event {
+            action: Action::FellBack,
+            cause,
+            value,
+            limit,
+        }
+    }
+
+    /// Hands the learned model over, or makes it the good one, once it was good for long enough.
+    fn trust(&mut self, calm: bool, period: S) -> Option<Event<S>> {
+        if !(calm && self.models.learned_is_good()) {
+            self.calm_for = S::zero();
+            return None;
+        }
+        self.calm_for += period;
+        if self.calm_for < self.thresholds.calm || !self.models.adapts() {
+            return None;
+        }
+        let event = Event {
+            action: Action::Resumed,
+            cause: Cause::Calm,
+            value: self.calm_for,
+            limit: self.thresholds.calm,
+        };
+        self.calm_for = S::zero();
+        self.models.promote();
+        let was = core::mem::replace(&mut self.fallen, false);
+        self.proved = true;
+        was.then_some(event)
+    }
+}
+
+impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervise<S> for Supervisor<S, B> {
+    fn judge(
+        &mut self,
+        seen: &Observation<'_, S>,
+        reference: &[S],
+        observer: &mut dyn Observer<S>,
+        model: &mut dyn AffineModel<S>,
+    ) -> Option<Event<S>> {
+        let period = seen.tick.period;
+        self.now = seen.tick.time;
+        if self.falls > 0 && self.now - self.fallen_since > S::of(REMEMBERED) {
+            self.falls = 0;
+        }
+        if let Some(event) = self.sensors(seen) {
+            return Some(event);
+        }
+        let t = self.thresholds;
+        self.models
+            .compare(seen, observer, t.window, self.unusual_for == S::zero());
+        let unusual = self
+            .models
+            .unusual()
+            .filter(|(_, times)| *times > t.innovation);
+        self.unusual_for = match unusual {
+            Some(_) => self.unusual_for + period,
+            None => S::zero(),
+        };
+        if let Some((row, times)) = unusual
+            && self.unusual_for > t.innovation_for
+        {
+            return Some(stopped(Cause::Innovation(row), times, t.innovation));
+        }
+        let lost = self.off_track(seen, reference);
+        for (to, from) in self.reference.as_mut().iter_mut().zip(reference) {
+            *to = *from;
+        }
+        let worse = self.models.worse().filter(|(_, times)| *times > t.worse);
+        let worse = worse.map(|(row, times)| (Cause::Worse(row), times, t.worse));
+        if !self.fallen
+            && let Some(reason) = worse.or(lost)
+        {
+            return Some(self.fall_back(reason, observer, model));
+        }
+        if let Some((cause, value, limit)) = lost {
+            return Some(stopped(cause, value, limit));
+        }
+        let event = self.trust(unusual.is_none(), period);
+        let to = (!self.fallen).then_some(model);
+        self.models.take(observer, to);
+        event
+    }
+
+    fn fallen(&self) -> bool {
+        self.fallen && self.proved
+    }
+}
+
+fn stopped<S>(cause: Cause, value: S, limit: S) -> Event<S> {
+    Event {
+        action: Action::Stopped,
+        cause,
+        value,
+        limit,
+    }
+}
+
+fn over<S: Real>(value: S, limit: S, cause: Cause) -> Option<Event<S>> {
+    (value > limit).then(|| stopped(cause, value, limit))
+}
