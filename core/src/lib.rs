@@ -79,7 +79,7 @@ pub use limits::Limits;
 pub use parameter::Parameter;
 #[doc(hidden)]
 pub use plant::check_sizes as plant_check;
-pub use plant::{ControlAffine, Dynamics, Parameterization, Plant, PlantMeta};
+pub use plant::{ControlAffine, Dynamics, MAX_STEP_S, Parameterization, Plant, PlantMeta};
 pub use real::Real;
 pub use signal::Signal;
 pub use tick::{Loop, Observation, Observer, Step, Tick, TickError};

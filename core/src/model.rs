@@ -38,24 +38,12 @@ pub struct ModelFile {
 }
 
 /// `[simulation]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SimulationOptions {
-    /// Longest integration step, s.
-    #[serde(default = "default_step")]
-    pub max_step_s: f64,
-}
-
-fn default_step() -> f64 {
-    0.0025
-}
-
-impl Default for SimulationOptions {
-    fn default() -> Self {
-        Self {
-            max_step_s: default_step(),
-        }
-    }
+    /// Longest integration step, s; by default the plant's own ([`Plant::MAX_STEP_S`](crate::Plant::MAX_STEP_S)).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_step_s: Option<f64>,
 }
 
 /// `[fit]`: parameters that a fit estimates or holds, where this differs from their declaration.
@@ -245,7 +233,8 @@ impl Model {
         }
         make_names_unique(&mut parameters, &effects);
 
-        let step = file.simulation.max_step_s;
+        let usual = <f64 as HostReal>::dynamics(ready.dynamics).max_step_s();
+        let step = file.simulation.max_step_s.unwrap_or(usual);
         if !(step > 0.0 && step.is_finite()) {
             return Err(source.error(
                 &["simulation".into(), "max_step_s".into()],
@@ -410,6 +399,11 @@ impl Model {
             .iter()
             .filter(|c| matches!(c.place, Place::Effort(_)))
             .count()
+    }
+
+    /// Longest integration step of the plant where no file gives one, s.
+    pub fn usual_step(&self) -> f64 {
+        f64::dynamics(self.dynamics).max_step_s()
     }
 
     /// Parameters of the plant's equations from the model's values.

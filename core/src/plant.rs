@@ -48,6 +48,9 @@ pub struct Parameterization {
     pub parameters: &'static [Parameter],
 }
 
+/// Longest integration step of a machine on wheels or a motor, s.
+pub const MAX_STEP_S: f64 = 0.0025;
+
 /// A plant, as its author writes it: `dx/dt = f(t, x, u, w; p)`.
 ///
 /// `NX` states, `NU` inputs, `NW` effort channels, `NP` parameters, `NY` outputs. `w[c]` is the
@@ -61,6 +64,10 @@ pub trait Plant<const NX: usize, const NU: usize, const NW: usize, const NP: usi
 
     /// Quantities that follow from the parameters.
     const DERIVED: &'static [Derived] = &[];
+
+    /// Longest integration step where a model file gives none, s: a quarter of the fastest time
+    /// constant that is usual, or less.
+    const MAX_STEP_S: f64 = MAX_STEP_S;
 
     /// The rate of the state, in the state's units per second.
     fn derivative<S: Real>(x: &[S; NX], u: &[S; NU], w: &[S; NW], p: &[S; NP]) -> [S; NX];
@@ -109,6 +116,10 @@ pub trait Dynamics<S: Real>: Send + Sync {
     /// Parameters of the equations from the values the file gives (set 0 is the equations' own,
     /// set `i` is [`PlantMeta::parameterizations`]`[i - 1]`).
     fn lower(&self, set: usize, from: &[S], p: &mut [S]);
+    /// See [`Plant::MAX_STEP_S`].
+    fn max_step_s(&self) -> f64 {
+        MAX_STEP_S
+    }
     /// See [`Plant::DERIVED`].
     fn derivable(&self) -> &'static [Derived] {
         &[]
@@ -208,6 +219,9 @@ macro_rules! declare_plant {
                         *to = from;
                     }
                 }
+            }
+            fn max_step_s(&self) -> f64 {
+                <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::MAX_STEP_S
             }
             fn derivable(&self) -> &'static [$crate::Derived] {
                 <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::DERIVED

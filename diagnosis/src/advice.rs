@@ -18,6 +18,7 @@ pub(crate) fn advice(
     model: &Model,
     verdict: Conclusion,
     best: Option<&Explanation>,
+    explained: Option<&Explanation>,
 ) -> Vec<Advice> {
     let mut list = Vec::new();
     if let (Conclusion::EffectMissing, Some(best)) = (verdict, best) {
@@ -40,8 +41,16 @@ pub(crate) fn advice(
         }
     }
     if verdict == Conclusion::DataInsufficient {
+        let log = "the log is explained down to its noise, the test recording is not: what is missing";
         list.push(Advice {
-            why: "the log is explained down to its noise, the test recording is not: what is missing never shows in the log".to_owned(),
+            why: match explained {
+                None => format!("{log} never shows in the log"),
+                Some(by) => format!(
+                    "with `{}` at {} {log} shows in the log, but not so that it can be told what it is",
+                    by.place.effect,
+                    by.place.at.join(", ")
+                ),
+            },
             experiment: "fit to a recording with inputs like those of the test recording: several levels, slow ramps through zero, rests, both directions".to_owned(),
         });
     }

@@ -218,10 +218,16 @@ pub(crate) fn diagnose_above(
         (earned && significance > SIGNIFICANT && matters && determined(&explanations[0]))
             .then(|| explanations[0].place.clone())
     });
-    // The log explains itself and the test does not: what is missing never showed in the log.
+    // The log is explained and the test is not: what is missing did not show in the log, or not so
+    // that it could be told from something else.
     let floor_fit = self::floor(model, runs);
-    let blind =
-        test.is_some() && nominal_fit < BLIND * floor_fit && nominal_error > ABOVE_FLOOR * floor;
+    let explained = explanations
+        .iter()
+        .find(|e| e.nrmse_fit < BLIND * floor_fit && e.nrmse > ABOVE_FLOOR * floor)
+        .filter(|_| nominal_fit >= BLIND * floor_fit);
+    let blind = test.is_some()
+        && nominal_error > ABOVE_FLOOR * floor
+        && (nominal_fit < BLIND * floor_fit || explained.is_some());
     let verdict = match &missing {
         Some(_) => Conclusion::EffectMissing,
         None if blind => Conclusion::DataInsufficient,
@@ -232,7 +238,7 @@ pub(crate) fn diagnose_above(
     let residual_force = (verdict == Conclusion::UnknownEffect)
         .then(|| residual_force::of_solution(&fitted_nominal, &nominal, runs))
         .flatten();
-    let advice = advice::advice(&fitted_nominal, verdict, explanations.first());
+    let advice = advice::advice(&fitted_nominal, verdict, explanations.first(), explained);
     explanations.truncate(REPORTED);
     Ok(Diagnosis {
         nominal: Level {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::model::{Model, SimulationOptions};
+use loopsight_core::model::Model;
 use rayon::prelude::*;
 
 use crate::candidates::Candidate;
@@ -22,10 +22,10 @@ pub(crate) const FINAL: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
 };
-/// Longest integration steps of a promise and of a first look, s. Where a position is read the short
-/// one serves both: cogs run by.
-const PROMISE_STEP: f64 = 0.01;
-const LOOK_STEP: f64 = 0.005;
+/// Longest integration steps of a promise and of a first look, in those of the plant. Where a position
+/// is read the short one serves both: cogs run by.
+const PROMISE_STEPS: f64 = 4.0;
+const LOOK_STEPS: f64 = 2.0;
 
 /// Most starts of a candidate that is looked at from where a simpler one ended.
 const GROWN: usize = 3;
@@ -171,10 +171,11 @@ fn starts(
 
 /// The model of a candidate with coarser steps. A file that asks for finer steps than usual has lags
 /// that no longer ones stand.
-fn coarse(candidate: &Candidate, step: f64) -> Model {
+fn coarse(candidate: &Candidate, steps: f64) -> Model {
     let mut model = candidate.model.clone();
-    if model.max_step >= SimulationOptions::default().max_step_s {
-        model.max_step = model.max_step.max(step);
+    let usual = model.usual_step();
+    if model.max_step >= usual {
+        model.max_step = model.max_step.max(steps * usual);
     }
     model
 }
@@ -186,12 +187,12 @@ pub(crate) fn promise(
     holdout: &Holdout<'_>,
     nominal: &Solution,
 ) -> Option<f64> {
-    let step = if Positions::matter_to(candidate.meta) {
-        LOOK_STEP
+    let steps = if Positions::matter_to(candidate.meta) {
+        LOOK_STEPS
     } else {
-        PROMISE_STEP
+        PROMISE_STEPS
     };
-    let model = coarse(candidate, step);
+    let model = coarse(candidate, steps);
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
     let mut problem =
         Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {}).ok()?;
@@ -213,7 +214,7 @@ pub(crate) fn look(
     holdout: &Holdout<'_>,
     nominal: &Solution,
 ) -> Option<Judged> {
-    let model = coarse(candidate, LOOK_STEP);
+    let model = coarse(candidate, LOOK_STEPS);
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
     let problem = || Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {});
     let mut start = start.to_vec();

@@ -226,6 +226,9 @@ impl Plant<2, 1, 4, 4, 2> for TankPair {
         controlled: &[],
     };
 
+    /// A film of 1 mm runs off in some 5 s.
+    const MAX_STEP_S: f64 = 0.25;
+
     const DERIVED: &'static [Derived] = &[
         Derived::new(
             "level_upper_per_squared_volt",

@@ -13,7 +13,7 @@
 use std::fmt::Write as _;
 
 use loopsight_core::model::Model;
-use loopsight_diagnosis::{Conclusion, Diagnosis, diagnose};
+use loopsight_diagnosis::{Conclusion, Diagnosis, Explanation, Place, diagnose};
 use loopsight_hidden::{Experiment, Hidden, Robot, catalogue, record_with, refit};
 use loopsight_plants as _;
 use rayon::prelude::*;
@@ -33,7 +33,7 @@ seeds. Remade by
     cargo run --release -p loopsight-tests --example blind_table -- --write examples/hidden-effect/BLIND.md
 
 `right`: the effect itself, or one in a class with it that the diagnosis says it cannot tell from it,
-comes first, or the log cannot show it and is said to show none. `seen in the log`: a refit of the
+comes first, or the log cannot show it and is said to show none, or not what it is. `seen in the log`: a refit of the
 plain model leaves at least 1.15 times the floor. Errors are those on the multi-level recording, means
 over the row; `floor` is what the resolution of the encoders alone leaves there. `parameter error` is
 the median over the effect's parameters where the truth has the form of the effect; `in the interval`
@@ -188,6 +188,11 @@ fn try_one(
             diagnosis.verdict,
             Conclusion::DataInsufficient | Conclusion::NothingMissing
         ),
+        // Or that it can be told from nothing that explains the log as well.
+        Some(truth) if diagnosis.verdict == Conclusion::DataInsufficient => {
+            let best = diagnosis.candidates.first();
+            best.is_some_and(|best| among(&best.place, best, truth.effect.id(), &truth.at))
+        }
         Some(truth) => named(&diagnosis, truth.effect.id(), &truth.at),
     };
     let best = diagnosis.candidates.first();
@@ -257,7 +262,12 @@ fn named(diagnosis: &Diagnosis, id: &str, at: &[&str]) -> bool {
     let (Some(missing), Some(best)) = (&diagnosis.missing, diagnosis.candidates.first()) else {
         return false;
     };
-    let mut class = vec![missing];
+    among(missing, best, id, at)
+}
+
+/// Whether the effect is `first`, or in the class that `best` leads.
+fn among(first: &Place, best: &Explanation, id: &str, at: &[&str]) -> bool {
+    let mut class = vec![first];
     class.extend(&best.indistinguishable_from);
     // On an axis an effort at the load is one at the shaft times a constant.
     let one = |c: &str| if c == "load" { "shaft" } else { c }.to_owned();

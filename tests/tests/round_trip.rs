@@ -339,7 +339,7 @@ proptest! {
         run in option::of(name()),
         inputs in btree_map(name(), column(), 0..3),
         measured in btree_map(name(), measured(), 0..3),
-        max_step_s in finite(),
+        max_step_s in option::of(finite()),
         free in vec(name(), 0..3),
         fixed in vec(name(), 0..3),
     ) {

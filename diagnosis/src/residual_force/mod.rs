@@ -157,6 +157,8 @@ pub(crate) fn of_solution(
     };
     let depends_on = dependences(&held, &found.group, &at, &laws);
     let share = (1.0 - (found.left - noise) / explainable).clamp(0.0, 1.0);
+    // A force that does not vary has no variance to account for.
+    let share = if share.is_nan() { 0.0 } else { share };
     let names: Vec<String> = at
         .iter()
         .map(|c| found.group.channels[*c].id.to_owned())

@@ -52,7 +52,12 @@ pub(super) fn statement(
         } else {
             format!("an expression in {}", both(&names))
         };
-        format!("{of} accounts for {}", percent(share))
+        // A constant force has no variance to account for.
+        if share > 0.0 {
+            format!("{of} accounts for {}", percent(share))
+        } else {
+            format!("it begins with {of}")
+        }
     });
     let depends = if named.is_empty() {
         format!("the mean of the residual force at {at} depends on no single quantity")
