@@ -24,8 +24,12 @@ pub trait Estimator<S: Real>: Send {
     fn update(&mut self, regressor: &[S], measurement: S) -> Innovation<S>;
     /// The estimate.
     fn theta(&self) -> &[S];
-    /// Its covariance relative to the variance of the measurement noise, column by column.
+    /// Its covariance relative to the variance of the measurement noise, column by column; NaN where
+    /// the method has none.
     fn covariance(&self) -> &[S];
+    /// Moves the estimate and leaves the covariance as it is: who guards the estimator holds it in
+    /// range by this. Ignored unless `theta` has the right length and is finite.
+    fn set_theta(&mut self, theta: &[S]);
     /// Starts over from `theta` with the initial covariance.
     fn reset(&mut self, theta: &[S]);
 }
@@ -40,6 +44,9 @@ impl<S: Real, E: Estimator<S> + ?Sized> Estimator<S> for Box<E> {
     }
     fn covariance(&self) -> &[S] {
         (**self).covariance()
+    }
+    fn set_theta(&mut self, theta: &[S]) {
+        (**self).set_theta(theta);
     }
     fn reset(&mut self, theta: &[S]) {
         (**self).reset(theta);

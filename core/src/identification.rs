@@ -1,32 +1,36 @@
 //! Identification while the loop runs.
 
-use serde::{Deserialize, Serialize};
+mod settings;
 
+use nalgebra::{DVector, Dyn};
+
+use crate::learning::{Guarded, Lesson, Range, Withheld};
 use crate::model::Model;
 use crate::registry::{BuildError, EstimatorPart};
 use crate::regression::{Regression, RegressionError, Scheme};
 use crate::{AffineModel, Estimator, Innovation, Observation, Observer};
+pub use settings::LearningSettings;
 
-/// `[learning]` of a loop file: what is done with an estimator, whichever it is.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LearningSettings {
-    /// The controller uses the estimates as if they were true. Otherwise it keeps the model of the
-    /// model file, and the estimates are only watched.
-    pub certainty_equivalence: bool,
-}
-
-/// One recursive estimator per controlled state, fed with the regressions of the model.
+/// One recursive estimator per controlled state, fed with the regressions of the model and guarded
+/// (see [`Guarded`]).
 ///
 /// It watches a loop as its [`Observer`]; nothing is allocated in
 /// [`observe`](Observer::observe).
 pub struct Identification {
     settings: LearningSettings,
     regression: Regression,
-    estimators: Vec<Box<dyn Estimator<f64>>>,
-    innovations: Vec<Option<Innovation<f64>>>,
+    rows: Vec<Row>,
+    /// Present values of all parameters of the model.
+    values: Vec<f64>,
+    /// Indices of those that are learned, without repetition.
+    learned: Vec<usize>,
     /// As long as the longest regressor: where an estimator starts over.
     start: Vec<f64>,
+}
+
+struct Row {
+    estimator: Guarded<f64, Box<dyn Estimator<f64>>, Dyn>,
+    lesson: Lesson<f64>,
 }
 
 /// Why identification cannot be set up.
@@ -38,47 +42,78 @@ pub enum IdentificationError {
     /// The estimator's table is wrong.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// A setting of `[learning]` is wrong; the key is a path within that table.
+    #[error(transparent)]
+    Learning(BuildError),
 }
 
 impl Identification {
     /// Estimators built from `part` for the free parameters of `model`, starting from the model's
-    /// values (0 where there is none).
+    /// values (0 where there is none), for a loop with `period` (s).
     pub fn new(
         model: &Model,
         scheme: Scheme,
         part: &dyn EstimatorPart,
         settings: &LearningSettings,
+        period: f64,
     ) -> Result<Self, IdentificationError> {
         let regression = Regression::new(model, scheme)?;
-        let mut estimators = Vec::new();
+        settings
+            .check(model)
+            .map_err(IdentificationError::Learning)?;
+        let values: Vec<f64> = model
+            .parameters
+            .iter()
+            .map(|p| p.value.unwrap_or(0.0))
+            .collect();
+        let mut rows = Vec::new();
+        let mut learned = Vec::new();
         for row in 0..regression.len() {
-            let start: Vec<f64> = regression
-                .parameters(row)
+            let parameters = regression.parameters(row);
+            let ranges: Vec<Range<f64>> = parameters
                 .iter()
-                .map(|j| model.parameters[*j].value.unwrap_or(0.0))
-                .collect();
-            estimators.push(part.build(&start)?);
+                .map(|j| settings.range(model, *j))
+                .collect::<Result<_, _>>()
+                .map_err(IdentificationError::Learning)?;
+            let start = parameters.iter().zip(&ranges);
+            let start = DVector::from_iterator(
+                parameters.len(),
+                start.map(|(j, range)| values[*j].clamp(range.low, range.high)),
+            );
+            let estimator = part.build(start.as_slice())?;
+            let guards = settings.guards(model, row, period);
+            let guarded = Guarded::new(estimator, start, &ranges, guards).ok_or_else(|| {
+                let message = "an estimator has another number of parameters than was asked for";
+                BuildError::at("", message)
+            })?;
+            rows.push(Row {
+                estimator: guarded,
+                lesson: Lesson::none(Withheld::NoRegressor),
+            });
+            learned.extend_from_slice(parameters);
         }
-        let innovations = vec![None; estimators.len()];
-        let lengths = (0..regression.len()).map(|row| regression.parameters(row).len());
-        let longest = lengths.max().unwrap_or(0);
-        Ok(Self {
+        learned.sort_unstable();
+        learned.dedup();
+        let mut identification = Self {
             settings: settings.clone(),
-            start: vec![0.0; longest],
             regression,
-            estimators,
-            innovations,
-        })
+            rows,
+            start: vec![0.0; values.len()],
+            values,
+            learned,
+        };
+        identification.gather();
+        Ok(identification)
     }
 
     /// Number of regressions, each with its estimator.
     pub fn len(&self) -> usize {
-        self.estimators.len()
+        self.rows.len()
     }
 
     /// True without any regression.
     pub fn is_empty(&self) -> bool {
-        self.estimators.is_empty()
+        self.rows.is_empty()
     }
 
     /// Indices (into the model's parameters) of what the `row`-th estimator estimates.
@@ -86,52 +121,96 @@ impl Identification {
         self.regression.parameters(row)
     }
 
-    /// The `row`-th estimator.
-    pub fn estimator(&self, row: usize) -> &dyn Estimator<f64> {
-        self.estimators[row].as_ref()
+    /// The `row`-th estimator: estimates, deviations, excitation.
+    pub fn estimator(&self, row: usize) -> &Guarded<f64, Box<dyn Estimator<f64>>, Dyn> {
+        &self.rows[row].estimator
     }
 
-    /// What the last tick taught the `row`-th estimator; `None` when there was nothing to learn.
-    pub fn innovation(&self, row: usize) -> Option<Innovation<f64>> {
-        self.innovations[row]
+    /// What the last tick taught the `row`-th estimator, or why nothing.
+    pub fn lesson(&self, row: usize) -> Lesson<f64> {
+        self.rows[row].lesson
+    }
+
+    /// Present values of all parameters of the model: the learned ones as they are estimated, the
+    /// others as they were.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Indices of the parameters that are learned.
+    pub fn learned(&self) -> &[usize] {
+        &self.learned
+    }
+
+    /// Brings the estimates together. What several rows estimate is the mean of what they found, each
+    /// weighted with the inverse of its variance; where a row knows none, alike.
+    fn gather(&mut self) {
+        for &j in &self.learned {
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for (row, of) in self.rows.iter().enumerate() {
+                let parameters = self.regression.parameters(row);
+                if let Some(k) = parameters.iter().position(|p| *p == j) {
+                    let deviation = of.estimator.deviation(k);
+                    let weight = (deviation * deviation).recip();
+                    let weight = if weight.is_normal() { weight } else { 1e-12 };
+                    sum += weight * of.estimator.theta()[k];
+                    weights += weight;
+                }
+            }
+            self.values[j] = sum / weights;
+        }
     }
 }
 
 impl Observer<f64> for Identification {
     fn observe(&mut self, seen: &Observation<'_, f64>) {
-        self.innovations.fill(None);
-        if !seen.sample.fresh {
+        let withheld = Withheld::by(&seen.sample, seen.outcome, self.settings.while_saturated);
+        if withheld == Some(Withheld::Stale) {
             // A late answer would teach the regression a wrong rate.
             self.regression.restart();
+            for row in &mut self.rows {
+                row.lesson = Lesson::none(Withheld::Stale);
+            }
             return;
         }
         let time = seen.sample.time;
-        if self.regression.push(time, seen.measured, seen.applied) {
-            for (row, estimator) in self.estimators.iter_mut().enumerate() {
+        let ready = self.regression.push(time, seen.measured, seen.applied);
+        for (row, of) in self.rows.iter_mut().enumerate() {
+            of.lesson = if ready {
                 let (phi, y) = self.regression.row(row);
-                self.innovations[row] = Some(estimator.update(phi, y));
-            }
+                of.estimator.update(phi, y, withheld)
+            } else {
+                Lesson::none(Withheld::NoRegressor)
+            };
         }
+        self.gather();
     }
 
     fn teach(&self, model: &mut dyn AffineModel<f64>) {
-        if !self.settings.certainty_equivalence {
-            return;
-        }
-        for (row, estimator) in self.estimators.iter().enumerate() {
-            let parameters = self.regression.parameters(row);
-            for (parameter, value) in parameters.iter().zip(estimator.theta()) {
-                model.learn(*parameter, *value);
+        if self.settings.certainty_equivalence {
+            for j in &self.learned {
+                model.learn(*j, self.values[*j]);
             }
         }
     }
 
+    /// Also of a tick that taught nothing, as long as there was a prediction.
     fn innovation(&self, row: usize) -> Option<Innovation<f64>> {
-        *self.innovations.get(row)?
+        let lesson = self.rows.get(row)?.lesson;
+        let learned = lesson.withheld.is_none();
+        lesson.innovation.is_finite().then_some(Innovation {
+            innovation: lesson.innovation,
+            relative_variance: if learned {
+                lesson.relative_variance
+            } else {
+                1.0
+            },
+            accepted: learned,
+        })
     }
 
     fn residual(&self, row: usize, values: &[f64]) -> Option<f64> {
-        self.innovation(row)?;
+        Observer::innovation(self, row)?;
         let (phi, y) = self.regression.row(row);
         let parameters = self.regression.parameters(row).iter().zip(phi);
         let explained = parameters.map(|(j, phi)| phi * values.get(*j).unwrap_or(&f64::NAN));
@@ -139,12 +218,13 @@ impl Observer<f64> for Identification {
     }
 
     fn restart(&mut self, values: &[f64]) {
-        for (row, estimator) in self.estimators.iter_mut().enumerate() {
+        for (row, of) in self.rows.iter_mut().enumerate() {
             let parameters = self.regression.parameters(row);
             for (to, j) in self.start.iter_mut().zip(parameters) {
                 *to = values.get(*j).copied().unwrap_or(0.0);
             }
-            estimator.reset(&self.start[..parameters.len()]);
+            of.estimator.reset(&self.start[..parameters.len()]);
         }
+        self.gather();
     }
 }

@@ -23,6 +23,7 @@ mod dual;
 mod effect;
 mod estimator;
 mod integrator;
+pub mod learning;
 pub mod limits;
 mod parameter;
 mod plant;

@@ -169,14 +169,22 @@ impl LoopFile {
                 let settings = self.learning.clone().unwrap_or_default();
                 let path: [Step; 2] = ["estimator".into(), part.meta().id.into()];
                 Some(
-                    Identification::new(model, self.regression, part.as_ref(), &settings).map_err(
-                        |error| match error {
-                            IdentificationError::Build(error) => placed(source, &path, error),
-                            IdentificationError::Regression(error) => {
-                                source.error(&path, &error.to_string(), None)
-                            }
-                        },
-                    )?,
+                    Identification::new(
+                        model,
+                        self.regression,
+                        part.as_ref(),
+                        &settings,
+                        self.period_s,
+                    )
+                    .map_err(|error| match error {
+                        IdentificationError::Build(error) => placed(source, &path, error),
+                        IdentificationError::Learning(error) => {
+                            placed(source, &["learning".into()], error)
+                        }
+                        IdentificationError::Regression(error) => {
+                            source.error(&path, &error.to_string(), None)
+                        }
+                    })?,
                 )
             }
         };

@@ -26,6 +26,9 @@ pub struct Parameter {
     pub max: f64,
     /// True when `min` and `max` themselves are not admissible.
     pub open: bool,
+    /// A control law divides by it: an estimate does not come near zero, and keeps its sign. A value
+    /// of zero is admissible all the same: a machine without that drive.
+    pub nonzero: bool,
     /// Value when the file gives none; `None` makes the parameter obligatory, unless a fit is to
     /// find it.
     pub default: Option<f64>,
@@ -61,6 +64,7 @@ impl Parameter {
             min: f64::NEG_INFINITY,
             max: f64::INFINITY,
             open: false,
+            nonzero: false,
             default: None,
             estimated: true,
             linear: true,
@@ -90,6 +94,12 @@ impl Parameter {
     pub const fn below(mut self, max: f64) -> Self {
         self.max = max;
         self.open = true;
+        self
+    }
+
+    /// An estimate keeps its sign and does not come near zero.
+    pub const fn nonzero(mut self) -> Self {
+        self.nonzero = true;
         self
     }
 

@@ -6,6 +6,11 @@
 
 #![cfg_attr(not(feature = "std"), no_std)]
 
+mod factor;
+mod kalman;
+mod lms;
 mod rls;
 
-pub use rls::{Rls, RlsError, RlsSettings};
+pub use kalman::{Kalman, KalmanError, KalmanSettings};
+pub use lms::{Lms, LmsError, LmsSettings};
+pub use rls::{Forgetting, Rls, RlsError, RlsSettings};

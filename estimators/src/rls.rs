@@ -1,13 +1,17 @@
-//! Recursive least squares with exponential forgetting.
+//! Recursive least squares with forgetting.
 
 use loopsight_core::{Estimator, Innovation, Real};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
 
-mod settings;
-pub use settings::{RlsError, RlsSettings};
+use crate::factor::Factor;
 
-/// Recursive least squares (RLS) with exponential forgetting and a bounded covariance.
+mod forgetting;
+mod settings;
+use forgetting::Memory;
+pub use settings::{Forgetting, RlsError, RlsSettings};
+
+/// Recursive least squares (RLS) with forgetting and a bounded covariance.
 ///
 /// ```text
 /// e = y - φᵀθ        K = P φ/(λ + φᵀP φ)                        (44)(46)(47)
@@ -23,8 +27,24 @@ pub use settings::{RlsError, RlsSettings};
 /// | `λ` | forgetting, in (0, 1]; the memory is about `1/(1 - λ)` samples | 1 |
 /// | `p_max` | greatest diagonal entry of `P` | of `θ_i²/y²` |
 ///
+/// **Rules of forgetting** ([`Forgetting`]).
+///
+/// * `constant`: `λ` as it is set.
+/// * `variable`: as much is forgotten as was learned that is new, so that the memory keeps the same sum
+///   of squared errors. A parameter that jumps is found at once, and in quiet times little is
+///   forgotten. With `N = 1/(1 - λ)`, `q = e²/(1 + φᵀPφ)` and the mean `σ²` of `q` over `10 N` samples,
+///   of which none counts for more than `9 σ²`:
+///   ```text
+///   λ_k = 1 - q/(N σ²), not below λ_min
+///   ```
+/// * `directional`: only what is known along the present regressor is forgotten; what is not excited
+///   stays known. Then, with `λ = 1` in the update above,
+///   ```text
+///   P <- P + (1 - λ)/λ · φ φᵀ/(φᵀP⁻¹φ)
+///   ```
+///
 /// **Windup.** Where the regressor does not excite a parameter, forgetting alone lets `P` grow as
-/// `λ^-k` until the next real sample throws the estimate far off. The last line stops that: it
+/// `λ^-k` until the next real sample throws the estimate far off. The bound stops that: it
 /// counts the present estimate of the `i`-th parameter as one more measurement of it, just good
 /// enough to hold its variance at `p_max`. `θ` does not move by it, `P` only shrinks, and the
 /// other parameters go on forgetting at the full rate; suspending the forgetting altogether would
@@ -33,12 +53,12 @@ pub use settings::{RlsError, RlsSettings};
 /// these terms.
 ///
 /// **Round-off.** `P` is kept as `U D Uᵀ` (`U` unit upper triangular, `D` diagonal). Each entry of
-/// `D` is multiplied by positive numbers only, so `P` cannot become indefinite however many updates
-/// there are, in `f32` as in `f64`, where the textbook difference `P - K φᵀP` does (an entry of `D`
-/// that would underflow is held at 1e-30). The matrix that [`Estimator::covariance`] shows is
-/// rounded once more; its diagonal is enlarged by `4 n²` rounding units, more than those roundings
-/// and a Cholesky factorisation can take away (Higham 2002, theorem 10.7), so that it, too, is
-/// positive definite, and exactly symmetric. The enlargement is not fed back.
+/// `D` is multiplied by positive numbers, or has positive ones added, so `P` cannot become indefinite
+/// however many updates there are, in `f32` as in `f64`, where the textbook difference `P - K φᵀP`
+/// does (an entry of `D` that would underflow is held at 1e-30). The matrix that
+/// [`Estimator::covariance`] shows is rounded once more; its diagonal is enlarged by `4 n²` rounding
+/// units, more than those roundings and a Cholesky factorisation can take away (Higham 2002, theorem
+/// 10.7), so that it, too, is positive definite, and exactly symmetric.
 ///
 /// Assumptions: `y = φᵀθ + noise`, noise white and independent of `φ`; `θ` constant or slow against
 /// `1/(1 - λ)` samples.
@@ -47,7 +67,11 @@ pub use settings::{RlsError, RlsSettings};
 /// ch. 11 (estimator windup, factored updates); G. J. Bierman (1977), "Factorization Methods for
 /// Discrete Sequential Estimation", ch. V (the `U D Uᵀ` update); S. Gunnarsson (1996), "Combining
 /// tracking and regularization in recursive least squares identification", CDC, 2551–2552 (the
-/// bound as regularisation). Numbers (44)–(47): Alves, Lages, Henriques (2018).
+/// bound as regularisation); T. R. Fortescue, L. S. Kershenbaum, B. E. Ydstie (1981), "Implementation
+/// of self-tuning regulators with variable forgetting factors", Automatica 17(6), 831–835; L. Cao,
+/// H. Schwartz (2000), "A directional forgetting algorithm based on the decomposition of the
+/// information matrix", Automatica 36(11), 1725–1731. Numbers (44)–(47): Alves, Lages, Henriques
+/// (2018).
 ///
 /// ```
 /// use loopsight_core::Estimator;
@@ -67,23 +91,16 @@ where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
     theta: OVector<S, D>,
+    next: OVector<S, D>,
     /// What [`Estimator::covariance`] shows.
     p: OMatrix<S, D, D>,
-    /// Strictly upper triangle of `U`; the rest is not used.
-    u: OMatrix<S, D, D>,
-    d: OVector<S, D>,
-    /// `Uᵀφ`, `D Uᵀφ` and `P φ` of the present update.
-    work: [OVector<S, D>; 3],
-    forgetting: S,
+    factor: Factor<S, D>,
+    rule: Forgetting,
+    memory: Memory<S>,
     initial: S,
     /// `p_max`, less what rounding may add to a diagonal entry.
     cap: S,
-    /// `1 + 4 n²` rounding units.
-    enlargement: S,
 }
-
-/// No entry of `D` falls below this.
-const LEAST: f64 = 1e-30;
 
 impl<S: Real, D: Dim> Rls<S, D>
 where
@@ -91,125 +108,43 @@ where
 {
     /// An estimator that starts from `theta`.
     pub fn new(theta: OVector<S, D>, settings: &RlsSettings) -> Result<Self, RlsError> {
-        let RlsSettings {
-            forgetting,
-            initial_covariance,
-            covariance_limit,
-        } = *settings;
-        let limit = covariance_limit.unwrap_or(initial_covariance);
-        let (dim, one) = theta.shape_generic();
         if theta.is_empty() || theta.iter().any(|v| !v.is_finite()) {
             return Err(RlsError::Theta);
         }
-        if !(forgetting > 0.0 && forgetting <= 1.0) {
-            return Err(RlsError::Forgetting(forgetting));
-        }
-        let initial = S::of(initial_covariance);
-        if !(initial_covariance >= LEAST && initial.is_finite()) {
-            return Err(RlsError::InitialCovariance(initial_covariance));
-        }
-        // The greatest number that can turn up is a variance that was just forgotten, times n².
-        let n = S::of(theta.len() as f64);
-        let greatest = S::of(limit) / S::of(forgetting) * n * n;
-        if !(limit >= initial_covariance && greatest.is_finite()) {
-            return Err(RlsError::CovarianceLimit(limit));
-        }
-        let slack = S::of(4.0) * n * n * rounding_unit();
-        let zero = OVector::zeros_generic(dim, one);
-        let start = theta.clone();
+        let (limit, least) = settings.check::<S>(theta.len())?;
+        let (dim, _) = theta.shape_generic();
+        let factor = Factor::new(dim);
         let mut rls = Self {
-            theta,
+            next: theta.clone(),
             p: OMatrix::zeros_generic(dim, dim),
-            u: OMatrix::zeros_generic(dim, dim),
-            d: zero.clone(),
-            work: [zero.clone(), zero.clone(), zero],
-            forgetting: S::of(forgetting),
-            initial,
-            cap: S::of(limit) / (S::one() + slack + slack),
-            enlargement: S::one() + slack,
+            cap: factor.shown_below(S::of(limit)),
+            factor,
+            rule: settings.rule,
+            memory: Memory::new(settings.forgetting, least),
+            initial: S::of(settings.initial_covariance),
+            theta,
         };
-        rls.restart(start.as_slice());
+        rls.restart();
         Ok(rls)
     }
 
-    fn restart(&mut self, theta: &[S]) {
-        self.theta.as_mut_slice().copy_from_slice(theta);
-        self.u.fill(S::zero());
-        self.d.fill(self.initial.smaller(self.cap));
-        self.show();
+    fn restart(&mut self) {
+        self.factor.restart(self.initial.smaller(self.cap));
+        self.factor.show(self.p.as_mut_slice());
+        self.memory.clear();
     }
 
-    /// Takes a measurement of `Uᵀφ = f` (with `v = D f`) whose noise has the variance `noise` into
-    /// `U` and `D`, and multiplies `D` by `growth`.
-    fn absorb(&mut self, noise: S, growth: S) {
-        let [f, v, b] = &mut self.work;
-        let (f, v, b) = (f.as_slice(), v.as_slice(), b.as_mut_slice());
-        let (u, d) = (self.u.as_mut_slice(), self.d.as_mut_slice());
-        let n = d.len();
-        let least = S::of(LEAST);
-        let mut alpha = noise;
-        let mut inverse = S::one() / alpha;
-        for j in 0..n {
-            let p = f[j] * inverse;
-            let before = alpha;
-            alpha += v[j] * f[j];
-            inverse = S::one() / alpha;
-            d[j] = (d[j] * (before * inverse) * growth).larger(least);
-            for i in 0..j {
-                let old = u[j * n + i];
-                u[j * n + i] = old - b[i] * p;
-                b[i] += old * v[j];
-            }
-            b[j] = v[j];
+    /// Forgets along `regressor`, and returns `φᵀPφ` after that.
+    fn forget_along(&mut self, regressor: &[S], spread: S) -> S {
+        let lambda = self.memory.constant();
+        let known = self.factor.known(regressor);
+        let growth = (S::one() - lambda) / (lambda * known);
+        if !(spread > S::zero() && growth.is_finite()) {
+            return spread;
         }
-    }
-
-    /// The `i`-th diagonal entry of `P`.
-    fn variance(&self, i: usize) -> S {
-        let (u, d) = (self.u.as_slice(), self.d.as_slice());
-        let n = d.len();
-        let mut sum = d[i];
-        for k in i + 1..n {
-            sum += u[k * n + i] * u[k * n + i] * d[k];
-        }
-        sum
-    }
-
-    /// Holds the variance of each parameter at `p_max`.
-    fn bound(&mut self) {
-        let n = self.d.len();
-        for i in 0..n {
-            let variance = self.variance(i);
-            if variance > self.cap {
-                let [f, v, _] = &mut self.work;
-                for j in 0..n {
-                    f[j] = match j.cmp(&i) {
-                        core::cmp::Ordering::Less => S::zero(),
-                        core::cmp::Ordering::Equal => S::one(),
-                        core::cmp::Ordering::Greater => self.u[(i, j)],
-                    };
-                    v[j] = self.d[j] * f[j];
-                }
-                self.absorb(self.cap * (variance / (variance - self.cap)), S::one());
-            }
-        }
-    }
-
-    /// `P = U D Uᵀ` for [`Estimator::covariance`].
-    fn show(&mut self) {
-        let (u, d, p) = (self.u.as_slice(), self.d.as_slice(), self.p.as_mut_slice());
-        let n = d.len();
-        for j in 0..n {
-            for i in 0..=j {
-                let mut sum = if i == j { d[j] } else { u[j * n + i] * d[j] };
-                for k in j + 1..n {
-                    sum += u[k * n + i] * d[k] * u[k * n + j];
-                }
-                p[j * n + i] = sum;
-                p[i * n + j] = sum;
-            }
-            p[j * n + j] *= self.enlargement;
-        }
+        self.factor.add(growth, |i| regressor[i]);
+        self.factor.bound(self.cap);
+        self.factor.spread(regressor)
     }
 }
 
@@ -229,49 +164,40 @@ where
         if regressor.len() != n {
             return refused;
         }
-        let [f, v, b] = &mut self.work;
-        let (f, v, b) = (f.as_mut_slice(), v.as_mut_slice(), b.as_mut_slice());
-        let (theta, u, d) = (
-            self.theta.as_mut_slice(),
-            self.u.as_slice(),
-            self.d.as_slice(),
-        );
         let mut innovation = measurement;
-        let mut spread = S::zero();
-        for j in 0..n {
-            let mut sum = regressor[j];
-            for i in 0..j {
-                sum += u[j * n + i] * regressor[i];
-            }
-            f[j] = sum;
-            v[j] = d[j] * sum;
-            spread += v[j] * sum;
-            innovation -= regressor[j] * theta[j];
+        for (phi, theta) in regressor.iter().zip(self.theta.iter()) {
+            innovation -= *phi * *theta;
         }
+        let predicted = self.factor.spread(regressor);
         // NaN and infinity anywhere in the sample end up in one of these two.
-        if !(innovation.is_finite() && spread.is_finite()) {
+        if !(innovation.is_finite() && predicted.is_finite()) {
             return refused;
         }
-        let step = innovation / (self.forgetting + spread);
-        for i in 0..n {
-            let mut sum = v[i];
-            for j in i + 1..n {
-                sum += u[j * n + i] * v[j];
-            }
-            b[i] = theta[i] + sum * step;
+        let square = innovation * innovation / (S::one() + predicted);
+        let (lambda, spread) = match self.rule {
+            Forgetting::Constant => (self.memory.constant(), predicted),
+            Forgetting::Variable => (self.memory.variable(square), predicted),
+            Forgetting::Directional => (S::one(), self.forget_along(regressor, predicted)),
+        };
+        let step = innovation / (lambda + spread);
+        for (i, next) in self.next.iter_mut().enumerate() {
+            *next = self.theta[i] + self.factor.gain(i) * step;
         }
-        if b.iter().any(|v| !v.is_finite()) {
+        if self.next.iter().any(|v| !v.is_finite()) {
             return refused;
         }
-        theta.copy_from_slice(b);
-        self.absorb(self.forgetting, S::one() / self.forgetting);
-        if self.forgetting < S::one() {
-            self.bound();
+        self.theta.copy_from(&self.next);
+        self.factor.absorb(lambda, S::one() / lambda);
+        if lambda < S::one() {
+            self.factor.bound(self.cap);
         }
-        self.show();
+        self.factor.show(self.p.as_mut_slice());
+        if self.rule == Forgetting::Variable {
+            self.memory.remember(square);
+        }
         Innovation {
             innovation,
-            relative_variance: S::one() + spread,
+            relative_variance: S::one() + predicted,
             accepted: true,
         }
     }
@@ -284,21 +210,19 @@ where
         self.p.as_slice()
     }
 
+    fn set_theta(&mut self, theta: &[S]) {
+        if theta.len() == self.theta.len() && theta.iter().all(|v| v.is_finite()) {
+            self.theta.as_mut_slice().copy_from_slice(theta);
+        }
+    }
+
     /// Nothing changes when `theta` has another length or is not finite.
     fn reset(&mut self, theta: &[S]) {
         if theta.len() == self.theta.len() && theta.iter().all(|v| v.is_finite()) {
-            self.restart(theta);
+            self.set_theta(theta);
+            self.restart();
         }
     }
-}
-
-/// Half the distance from 1 to the next number.
-fn rounding_unit<S: Real>() -> S {
-    let mut unit = S::one();
-    while S::one() + unit > S::one() {
-        unit *= S::of(0.5);
-    }
-    unit
 }
 
 #[cfg(test)]
@@ -327,6 +251,7 @@ mod tests {
             forgetting,
             initial_covariance: initial,
             covariance_limit: limit,
+            ..RlsSettings::default()
         }
     }
 
@@ -449,6 +374,22 @@ mod tests {
         ] {
             let error = Rls::new(zero, &settings).unwrap_err();
             assert_eq!(error.key(), key);
+            assert!(error.to_string().contains("expected"), "{error}");
+        }
+        for (rule, least, key) in [
+            (Forgetting::Variable, None, "forgetting"),
+            (Forgetting::Directional, None, "forgetting"),
+            (Forgetting::Variable, Some(0.995), "least_forgetting"),
+            (Forgetting::Variable, Some(0.0), "least_forgetting"),
+        ] {
+            let settings = RlsSettings {
+                rule,
+                least_forgetting: least,
+                forgetting: if key == "forgetting" { 1.0 } else { 0.99 },
+                ..RlsSettings::default()
+            };
+            let error = Rls::new(zero, &settings).unwrap_err();
+            assert_eq!(error.key(), key, "{error}");
             assert!(error.to_string().contains("expected"), "{error}");
         }
         let nothing: Result<Rls<f64, Dyn>, _> =

@@ -19,7 +19,7 @@ pub(crate) const DAMPING: Parameter = Parameter::new(
 .within(f64::NEG_INFINITY, 0.0);
 
 pub(crate) const DRIVE: Parameter =
-    Parameter::new("K_C", "K_C", "rad/s^2/V", "acceleration per volt");
+    Parameter::new("K_C", "K_C", "rad/s^2/V", "acceleration per volt").nonzero();
 
 pub(crate) const INERTIA: Parameter =
     Parameter::new("inertia", "I", "kg m^2", "moment of inertia at the shaft")

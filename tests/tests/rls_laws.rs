@@ -195,7 +195,7 @@ proptest! {
     fn fixed_and_run_time_sizes_give_the_same_digits(
         k in robots(), seed in any::<u64>(), forgetting in 0.9..=1.0f64,
     ) {
-        let settings = RlsSettings { forgetting, initial_covariance: 1e3, covariance_limit: None };
+        let settings = RlsSettings { forgetting, initial_covariance: 1e3, covariance_limit: None, ..RlsSettings::default() };
         let samples = robot(k, &mut Prbs::new(seed, 50, 9.0));
         same_digits::<f32>(&samples, &settings);
         same_digits::<f64>(&samples, &settings);
@@ -262,6 +262,7 @@ fn a_million_updates<S: Real>(forgetting: f64, excitation: Excitation) {
         forgetting,
         initial_covariance: 1e4,
         covariance_limit: Some(limit),
+        ..RlsSettings::default()
     };
     let what = format!("{} λ {forgetting} {excitation:?}", size_of::<S>() * 8);
     let mut rls = Rls::new(SVector::<S, 3>::zeros(), &settings).unwrap();

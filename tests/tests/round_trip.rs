@@ -23,7 +23,7 @@ use loopsight_core::run::{Column, ColumnMap, Hold, LogMap, Measured};
 use loopsight_core::sensor::{Encoder, Sensor};
 use loopsight_core::supervisor::SupervisorSettings;
 use loopsight_drivers::{Limit, Replay, SensorFault, Simulated};
-use loopsight_estimators::RlsSettings;
+use loopsight_estimators::{Forgetting, RlsSettings};
 use loopsight_plants as _;
 use loopsight_tests as _;
 use proptest::collection::{btree_map, vec};
@@ -386,11 +386,21 @@ fn controller() -> impl Strategy<Value = FeedbackLinearizingPiSettings> {
 }
 
 fn estimator() -> impl Strategy<Value = RlsSettings> {
-    (finite(), finite(), option::of(finite())).prop_map(
-        |(forgetting, initial_covariance, covariance_limit)| RlsSettings {
-            forgetting,
-            initial_covariance,
-            covariance_limit,
+    let rule = prop_oneof![
+        Just(Forgetting::Constant),
+        Just(Forgetting::Variable),
+        Just(Forgetting::Directional),
+    ];
+    let limits = (option::of(finite()), option::of(finite()));
+    (finite(), rule, finite(), limits).prop_map(
+        |(forgetting, rule, initial_covariance, (least_forgetting, covariance_limit))| {
+            RlsSettings {
+                forgetting,
+                rule,
+                least_forgetting,
+                initial_covariance,
+                covariance_limit,
+            }
         },
     )
 }

@@ -409,9 +409,7 @@ impl Recorder {
                 self.record.parameters[next].values.push(*theta);
                 next += 1;
             }
-            let innovation = identification
-                .innovation(row)
-                .map_or(f64::NAN, |i| i.innovation);
+            let innovation = identification.lesson(row).innovation;
             self.record.innovations[row].values.push(innovation);
         }
     }

@@ -145,11 +145,15 @@ impl Estimator<f64> for Filter {
         &self.covariance
     }
 
-    fn reset(&mut self, theta: &[f64]) {
-        let n = self.theta.len();
+    fn set_theta(&mut self, theta: &[f64]) {
         for (to, from) in self.theta.iter_mut().zip(theta) {
             *to = *from;
         }
+    }
+
+    fn reset(&mut self, theta: &[f64]) {
+        let n = self.theta.len();
+        self.set_theta(theta);
         self.covariance.fill(0.0);
         for i in 0..n {
             self.covariance[i * n + i] = self.start;

@@ -24,7 +24,8 @@ pub(super) const LUMPED: [Parameter; 8] = [
         "m/s^2/V",
         "forward acceleration per volt on each motor",
     )
-    .scaled(0.1),
+    .scaled(0.1)
+    .nonzero(),
     Parameter::new(
         "K_D",
         "K_D",
@@ -46,7 +47,8 @@ pub(super) const LUMPED: [Parameter; 8] = [
         "rad/s^2/V",
         "yaw acceleration per volt of difference",
     )
-    .scaled(0.1),
+    .scaled(0.1)
+    .nonzero(),
     Parameter::new(
         "half_track",
         "b",

@@ -1,0 +1,384 @@
+//! What keeps an estimator out of harm: the same for every estimator, on a desk and on a robot.
+
+mod excitation;
+mod projection;
+mod range;
+
+use core::fmt;
+
+use nalgebra::allocator::Allocator;
+use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
+
+use crate::{Command, Estimator, Real, Sample};
+use excitation::Information;
+use projection::into_box;
+pub use range::Range;
+
+/// Why nothing was learned from a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Withheld {
+    /// No regressor yet: the run begins, or samples are missing.
+    NoRegressor,
+    /// The measurement is older than its tick.
+    Stale,
+    /// An actuator was asked for more than it can give.
+    Saturated,
+    /// The controller held its last command.
+    HeldCommand,
+    /// A number that is not finite, or a regressor of another length.
+    NotFinite,
+    /// The innovation is within the dead zone.
+    DeadZone,
+    /// The regressor has no part along an excited direction.
+    Unexcited,
+}
+
+impl Withheld {
+    /// Identifier, for logs.
+    pub const fn id(self) -> &'static str {
+        match self {
+            Withheld::NoRegressor => "no_regressor",
+            Withheld::Stale => "stale",
+            Withheld::Saturated => "saturated",
+            Withheld::HeldCommand => "held_command",
+            Withheld::NotFinite => "not_finite",
+            Withheld::DeadZone => "dead_zone",
+            Withheld::Unexcited => "unexcited",
+        }
+    }
+
+    /// What of a tick forbids to learn from it; from saturated ticks only where `while_saturated`.
+    pub fn by<S>(sample: &Sample<S>, outcome: Command, while_saturated: bool) -> Option<Self> {
+        if !sample.fresh {
+            Some(Withheld::Stale)
+        } else if outcome.held {
+            Some(Withheld::HeldCommand)
+        } else if outcome.saturated && !while_saturated {
+            Some(Withheld::Saturated)
+        } else {
+            None
+        }
+    }
+}
+
+impl fmt::Display for Withheld {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Withheld::NoRegressor => "no regressor yet",
+            Withheld::Stale => "the sample is stale",
+            Withheld::Saturated => "an actuator saturates",
+            Withheld::HeldCommand => "the last command is held",
+            Withheld::NotFinite => "a number is not finite",
+            Withheld::DeadZone => "the innovation is within the dead zone",
+            Withheld::Unexcited => "nothing is excited",
+        })
+    }
+}
+
+/// What one sample taught.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lesson<S> {
+    /// Prediction error `y - φᵀθ` before the update, in the unit of `y`; NaN without a regressor.
+    pub innovation: S,
+    /// Its variance over that of the noise; NaN where nothing was learned.
+    pub relative_variance: S,
+    /// Why nothing was learned; `None` where something was.
+    pub withheld: Option<Withheld>,
+    /// The estimate left its range and was brought back.
+    pub projected: bool,
+}
+
+impl<S: Real> Lesson<S> {
+    /// Nothing learned, and no innovation either.
+    pub fn none(why: Withheld) -> Self {
+        Self {
+            innovation: S::of(f64::NAN),
+            relative_variance: S::of(f64::NAN),
+            withheld: Some(why),
+            projected: false,
+        }
+    }
+}
+
+/// When an estimator learns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guards {
+    /// Innovations up to this size teach nothing, larger ones only by what is beyond it; unit of `y`.
+    pub dead_zone: f64,
+    /// A direction is excited when a change of its parameters by their scales changes `y` by at least
+    /// this much (rms); unit of `y`. 0: every direction is.
+    pub least_excitation: f64,
+    /// Samples over which excitation and noise are averaged, at least 1.
+    pub window: f64,
+}
+
+impl Default for Guards {
+    /// No dead zone, every direction excited, two hundred samples.
+    fn default() -> Self {
+        Self {
+            dead_zone: 0.0,
+            least_excitation: 0.0,
+            window: 200.0,
+        }
+    }
+}
+
+/// An estimator that works in scaled parameters, learns only when a sample is worth it, and stays
+/// in range.
+///
+/// ```text
+/// θ_i = s_i ϑ_i      ψ_i = s_i φ_i      y = ψᵀϑ      e = y - ψᵀϑ̂
+/// M ← M + (ψψᵀ - M)/W      M = Q diag(m) Qᵀ                              excitation
+/// ψ' = Σ q_i q_iᵀψ over the i with √m_i ≥ m₀                             directions worth learning
+/// e' = e - δ sign e where |e| > δ, else nothing is learned              dead zone
+/// the estimator takes  y' = ψ'ᵀϑ̂ + e'  with  ψ'
+/// ϑ̂ ← arg min (ϑ - ϑ̂)ᵀ P⁻¹ (ϑ - ϑ̂)  subject to  low ≤ s ϑ ≤ high        projection
+/// ```
+///
+/// | symbol | what | unit |
+/// |---|---|---|
+/// | `y`, `e` | left-hand side of the regression, innovation | unit of `y` |
+/// | `θ_i`, `s_i` | parameter and its declared scale | of the parameter |
+/// | `M`, `m_i`, `W` | information per sample, its eigenvalues, window | unit of `y²`, samples |
+/// | `m₀`, `δ` | least excitation, dead zone | unit of `y` |
+/// | `P` | covariance of `ϑ̂` over the variance of the noise | 1/unit of `y²` |
+///
+/// **Excitation.** `√m_i` is by how much `y` changes, rms over the window, when the parameters change
+/// along `q_i` by one scale in all. The least of them is [`Guarded::excitation`]. What is not excited is
+/// taken as known: noise in a regressor of a robot that stands, or drives straight ahead, teaches
+/// nothing, and the other directions go on learning.
+///
+/// **Projection** is in the metric of the covariance: what one parameter is held back by, the others
+/// that are correlated with it make up for. Taking each to its bound on its own would spoil a good
+/// prediction, and a proof of convergence with it. An estimator whose covariance is not finite has
+/// each parameter taken to its bound.
+///
+/// Assumptions: disturbances of `y` up to about `δ`; scales of about the size by which parameters
+/// may be wrong.
+///
+/// Reference: G. C. Goodwin, K. S. Sin (1984), "Adaptive Filtering, Prediction and Control", section
+/// 3.6 (dead zone) and 3.7 (projection); B. Egardt (1979), "Stability of Adaptive Controllers", ch. 3
+/// (dead zone); A. Goel, A. L. Bruce, D. S. Bernstein (2020), "Recursive Least Squares With
+/// Variable-Direction Forgetting", IEEE Control Systems Magazine 40(4), 80–102 (information by direction);
+/// K. J. Åström, B. Wittenmark (2008), "Adaptive Control", section 2.4 (persistent excitation).
+#[derive(Clone, Debug)]
+pub struct Guarded<S: Real, E, D: Dim>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
+    estimator: E,
+    guards: Guards,
+    information: Information<S, D>,
+    scale: OVector<S, D>,
+    /// In the parameters' units.
+    bounds: [OVector<S, D>; 2],
+    /// In scales.
+    scaled_bounds: [OVector<S, D>; 2],
+    theta: OVector<S, D>,
+    covariance: OMatrix<S, D, D>,
+    noise: S,
+    lessons: S,
+    /// `ψ`, `ψ'` or `ϑ`, multipliers.
+    work: [OVector<S, D>; 3],
+}
+
+impl<S: Real, E: Estimator<S>, D: Dim> Guarded<S, E, D>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
+    /// Guards `estimator`, whose parameters are those of `ranges` over their scales; it starts over
+    /// from `theta`, in the parameters' units. `None` when the lengths differ, a scale is not above 0,
+    /// a range is empty or a guard is negative.
+    pub fn new(
+        estimator: E,
+        theta: OVector<S, D>,
+        ranges: &[Range<S>],
+        guards: Guards,
+    ) -> Option<Self> {
+        let n = theta.len();
+        let fits = n == ranges.len() && n == estimator.theta().len();
+        let usable = |r: &Range<S>| r.scale > S::zero() && r.scale.is_finite() && r.low <= r.high;
+        let guards_hold =
+            guards.dead_zone >= 0.0 && guards.least_excitation >= 0.0 && guards.window >= 1.0;
+        if !fits || !guards_hold || !ranges.iter().all(usable) {
+            return None;
+        }
+        let (dim, one) = theta.shape_generic();
+        let of = |value: &dyn Fn(&Range<S>) -> S| {
+            OVector::from_iterator_generic(dim, one, ranges.iter().map(value))
+        };
+        let zero = OVector::zeros_generic(dim, one);
+        let mut guarded = Self {
+            estimator,
+            information: Information::new(dim, guards.window),
+            guards,
+            scale: of(&|r| r.scale),
+            bounds: [of(&|r| r.low), of(&|r| r.high)],
+            scaled_bounds: [of(&|r| r.low / r.scale), of(&|r| r.high / r.scale)],
+            theta: zero.clone(),
+            covariance: OMatrix::zeros_generic(dim, dim),
+            noise: S::zero(),
+            lessons: S::zero(),
+            work: [zero.clone(), zero.clone(), zero],
+        };
+        guarded.reset(theta.as_slice());
+        Some(guarded)
+    }
+
+    /// Takes one regressor and its measurement, unless the sample is `withheld` for a reason of the
+    /// loop's. Allocates nothing.
+    pub fn update(
+        &mut self,
+        regressor: &[S],
+        measurement: S,
+        withheld: Option<Withheld>,
+    ) -> Lesson<S> {
+        if regressor.len() != self.theta.len() {
+            return Lesson::none(Withheld::NotFinite);
+        }
+        let [psi, part, _] = &mut self.work;
+        let mut innovation = measurement;
+        for (i, phi) in regressor.iter().enumerate() {
+            psi[i] = *phi * self.scale[i];
+            innovation -= psi[i] * self.estimator.theta()[i];
+        }
+        if !innovation.is_finite() || psi.iter().any(|v| !v.is_finite()) {
+            return Lesson::none(Withheld::NotFinite);
+        }
+        let mut lesson = Lesson {
+            innovation,
+            withheld,
+            ..Lesson::none(Withheld::NotFinite)
+        };
+        if withheld.is_some() {
+            return lesson;
+        }
+        if !self.information.take(psi.as_slice()) {
+            lesson.withheld = Some(Withheld::NotFinite);
+            return lesson;
+        }
+        let least = S::of(self.guards.least_excitation);
+        if !self
+            .information
+            .excited(psi.as_slice(), least, part.as_mut_slice())
+        {
+            lesson.withheld = Some(Withheld::Unexcited);
+            return lesson;
+        }
+        let zone = S::of(self.guards.dead_zone);
+        if innovation.abs() <= zone && zone > S::zero() {
+            lesson.withheld = Some(Withheld::DeadZone);
+            return lesson;
+        }
+        let beyond = innovation - innovation.held(-zone, zone);
+        let known: S =
+            (part.iter().zip(self.estimator.theta())).fold(S::zero(), |sum, (p, t)| sum + *p * *t);
+        let told = self.estimator.update(part.as_slice(), known + beyond);
+        if !told.accepted {
+            lesson.withheld = Some(Withheld::NotFinite);
+            return lesson;
+        }
+        lesson.relative_variance = told.relative_variance;
+        self.lessons = (self.lessons + S::one()).smaller(S::of(self.guards.window));
+        let square = innovation * innovation / told.relative_variance;
+        self.noise += (square - self.noise) / self.lessons;
+        lesson.projected = self.hold();
+        lesson
+    }
+
+    /// Brings the estimate into its range, and shows it in the parameters' units.
+    fn hold(&mut self) -> bool {
+        let [theta, _, multipliers] = &mut self.work;
+        theta.as_mut_slice().copy_from_slice(self.estimator.theta());
+        let [low, high] = &self.scaled_bounds;
+        let projected = into_box(
+            theta.as_mut_slice(),
+            self.estimator.covariance(),
+            low.as_slice(),
+            high.as_slice(),
+            multipliers.as_mut_slice(),
+        );
+        if projected {
+            self.estimator.set_theta(theta.as_slice());
+        }
+        let n = self.theta.len();
+        for i in 0..n {
+            let value = self.estimator.theta()[i] * self.scale[i];
+            // The product may round across the bound.
+            self.theta[i] = value.held(self.bounds[0][i], self.bounds[1][i]);
+            for j in 0..n {
+                self.covariance[(i, j)] =
+                    self.estimator.covariance()[j * n + i] * self.scale[i] * self.scale[j];
+            }
+        }
+        projected
+    }
+
+    /// The estimate, in the parameters' units, within its range.
+    pub fn theta(&self) -> &[S] {
+        self.theta.as_slice()
+    }
+
+    /// Covariance over the variance of the noise, column by column, in the parameters' units.
+    pub fn covariance(&self) -> &[S] {
+        self.covariance.as_slice()
+    }
+
+    /// Variance of the noise in `y`, from the innovations of the window that taught something.
+    pub fn noise_variance(&self) -> S {
+        self.noise
+    }
+
+    /// Standard deviation of the `i`-th parameter, as far as the noise is white; NaN where the estimator
+    /// has no covariance.
+    pub fn deviation(&self, i: usize) -> S {
+        (self.noise * self.covariance[(i, i)]).sqrt()
+    }
+
+    /// By how much `y` changes, rms over the window, when the parameters change by one scale in the
+    /// direction in which that shows least. Persistent excitation is when it stays away from zero.
+    pub fn excitation(&self) -> S {
+        self.information.least()
+    }
+
+    /// The least excitation over the greatest: 1 when all directions are excited alike, 0 when one is
+    /// not at all.
+    pub fn balance(&self) -> S {
+        self.information.balance()
+    }
+
+    /// What is guarded; its parameters are scaled.
+    pub fn estimator(&self) -> &E {
+        &self.estimator
+    }
+
+    /// Moves the estimate (in the parameters' units) without a change of what is known of its
+    /// uncertainty: for who falls back to values that were better. Ignored unless all are finite.
+    pub fn set_theta(&mut self, theta: &[S]) {
+        if self.scale_into_work(theta) {
+            self.estimator.set_theta(self.work[0].as_slice());
+            self.hold();
+        }
+    }
+
+    /// Starts over from `theta`, in the parameters' units. Ignored unless all are finite.
+    pub fn reset(&mut self, theta: &[S]) {
+        if self.scale_into_work(theta) {
+            self.estimator.reset(self.work[0].as_slice());
+            self.information.clear();
+            (self.noise, self.lessons) = (S::zero(), S::zero());
+            self.hold();
+        }
+    }
+
+    fn scale_into_work(&mut self, theta: &[S]) -> bool {
+        let usable = theta.len() == self.theta.len() && theta.iter().all(|v| v.is_finite());
+        if usable {
+            for (i, value) in theta.iter().enumerate() {
+                self.work[0][i] = *value / self.scale[i];
+            }
+        }
+        usable
+    }
+}
