@@ -41,7 +41,8 @@ pub(crate) fn advice(
         }
     }
     if verdict == Conclusion::DataInsufficient {
-        let log = "the log is explained down to its noise, the test recording is not: what is missing";
+        let log =
+            "the log is explained down to its noise, the test recording is not: what is missing";
         list.push(Advice {
             why: match explained {
                 None => format!("{log} never shows in the log"),
