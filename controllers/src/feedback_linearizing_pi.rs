@@ -16,16 +16,18 @@ pub use settings::{FeedbackLinearizingPiSettings, PerChannel};
 /// State feedback that makes each controlled state one integrator, and a PI law around each.
 ///
 /// ```text
-/// V   = G(ȳ)⁻¹ (ν - f(ȳ)),  ȳ = y + ν T/2     makes  y' = f + G V  into  y' = ν      (48)
+/// u   = G(ȳ)⁻¹ (ν - f(ȳ)),  ȳ = y + ν T/2     makes  y' = f + G u  into  y' = ν      (48)
+/// V   = E⁻¹(u)                                 undoes what lies between command and plant
 /// ν_k = k_p (β r_k - y_k) + z_k                                                      (49)
 /// z_{k+1} = z_k + k_i T (r_k - y_k) + k_i T/(k_p β) (ν_a - ν_k)
-/// V_a = V held within ±V_max,  ν_a = f(ȳ) + G(ȳ) V_a,  ȳ = y + ν_a T/2
+/// V_a = V held within ±V_max,  ν_a = f(ȳ) + G(ȳ) E(V_a),  ȳ = y + ν_a T/2
 /// ```
 ///
 /// | symbol | what | unit |
 /// |---|---|---|
 /// | `y`, `r` | controlled states and their references | unit of the state |
-/// | `V`, `V_max` | inputs and their limits | unit of the input |
+/// | `V`, `V_max` | commands and their limits | unit of the input |
+/// | `u`, `E` | inputs at the plant, and what makes them of commands ([`AffineModel::pass`]) | unit of the input |
 /// | `ν`, `ν_a` | acceleration asked for; achieved after the limits | of `y` per s |
 /// | `f`, `G` | drift and input matrix of the model ([`AffineModel`]) | of `y` per s (per `V`) |
 /// | `k_p`, `k_i`, `β` | gains and reference weight of [`SampledPi`] | 1/s, 1/s², 1 |
@@ -45,9 +47,13 @@ pub use settings::{FeedbackLinearizingPiSettings, PerChannel};
 /// that became singular while it was being learned) the last command is held, the integral waits,
 /// and [`Command::held`] says so.
 ///
-/// Assumptions: as many inputs as controlled states, `G` invertible, measurements without delay (a
-/// velocity taken from encoder counts is the mean over the last period, half a period old: the loop
-/// then behaves as if the plant had that delay).
+/// **Effects** in the model file are in `f`, `G` and `E`: friction, drag, gravity, dead zone, sag and
+/// the like are compensated with nothing about them said here; delays and lags are predicted over.
+/// [`loopsight_core::AffineModel`] says how, and the notes of a loop what of it applies.
+///
+/// Assumptions: as many inputs as controlled states, `G` invertible, measurements without delay but
+/// for what the model predicts over (a velocity taken from encoder counts is the mean over the last
+/// period, half a period old: without a predictor the loop behaves as if the plant had that delay).
 ///
 /// Reference: Alves, Lages, Henriques (2018), (48)–(52); A. Isidori (1995), "Nonlinear Control
 /// Systems", ch. 5; R. Hanus, M. Kinnaert, J.-L. Henrotte (1987), "Conditioning technique, a
@@ -78,6 +84,8 @@ where
     safe: OVector<S, D>,
     demand: OVector<S, D>,
     middle: OVector<S, D>,
+    aim: OVector<S, D>,
+    felt: OVector<S, D>,
     drift: OVector<S, D>,
     scale: OVector<S, D>,
     matrix: OMatrix<S, D, D>,
@@ -173,6 +181,8 @@ where
             safe: zero.clone(),
             demand: zero.clone(),
             middle: zero.clone(),
+            aim: zero.clone(),
+            felt: zero.clone(),
             drift: zero.clone(),
             scale: zero,
             matrix: OMatrix::zeros_generic(dim, dim),
@@ -227,7 +237,13 @@ where
                 Law::OpenLoop(acceleration) => acceleration[i],
             };
             self.middle[i] = measured[i] + half * self.demand[i];
+            self.aim[i] = match &self.law {
+                Law::Pi { .. } => reference[i],
+                // Ever further in this direction.
+                Law::OpenLoop(acceleration) => measured[i] + S::of(1e6) * acceleration[i],
+            };
         }
+        model.aim(self.aim.as_slice());
         // A model that writes nothing must not go unnoticed.
         self.drift.fill(S::of(f64::NAN));
         self.matrix.fill(S::of(f64::NAN));
@@ -249,7 +265,7 @@ where
         {
             return Ok(self.hold(command));
         }
-        let mut saturated = false;
+        let mut saturated = !model.invert(self.middle.as_slice(), command);
         for (value, limit) in command.iter_mut().zip(self.limit.iter()) {
             saturated |= value.abs() > *limit;
             *value = value.held(-*limit, *limit);
@@ -265,7 +281,10 @@ where
             if saturated {
                 // Clipped, the middle of the period lies elsewhere.
                 let achieved = &mut self.scale;
-                accelerate(&self.drift, &self.matrix, command, achieved);
+                let felt = self.felt.as_mut_slice();
+                felt.copy_from_slice(command);
+                model.pass(self.middle.as_slice(), felt);
+                accelerate(&self.drift, &self.matrix, felt, achieved);
                 for i in 0..n {
                     self.middle[i] = measured[i] + half * achieved[i];
                 }
@@ -274,7 +293,7 @@ where
                     self.drift.as_mut_slice(),
                     self.matrix.as_mut_slice(),
                 );
-                accelerate(&self.drift, &self.matrix, command, achieved);
+                accelerate(&self.drift, &self.matrix, felt, achieved);
             }
             for i in 0..n {
                 // The reference that the inputs, as clipped, can follow.

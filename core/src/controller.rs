@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::{Real, Tick};
+use crate::{Observation, Real, Tick};
 
 /// What a controller says of the command it wrote.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,6 +32,10 @@ impl fmt::Display for ControlError {
 impl core::error::Error for ControlError {}
 
 /// A plant seen by a controller: `dy/dt = f(y) + G(y) u` for the controlled states `y`.
+///
+/// `u` are the inputs at the plant. What lies between a command and them (a dead zone, a supply that
+/// sags) is inverted by [`AffineModel::invert`]; what makes commands or measurements late is made up
+/// for by [`AffineModel::track`]. A model without any of that implements the first two methods only.
 pub trait AffineModel<S: Real> {
     /// Number of controlled states, equal to the number of inputs.
     fn size(&self) -> usize;
@@ -41,6 +45,30 @@ pub trait AffineModel<S: Real> {
     /// [`AffineModel::evaluate`] from now on. A model that learns nothing ignores it.
     fn learn(&mut self, parameter: usize, value: S) {
         let _ = (parameter, value);
+    }
+    /// Says where the controlled states are wanted: what depends on the direction of a motion that
+    /// has hardly begun (dry friction) is taken in that direction, until the next call.
+    fn aim(&mut self, wanted: &[S]) {
+        let _ = wanted;
+    }
+    /// Replaces the inputs wanted at the plant by the commands that bring them about at `y`. False
+    /// where no command does; the nearest are written.
+    fn invert(&mut self, y: &[S], input: &mut [S]) -> bool {
+        let _ = (y, input);
+        true
+    }
+    /// Replaces commands by what they come to at the plant at `y`: the other way round.
+    fn pass(&mut self, y: &[S], command: &mut [S]) {
+        let _ = (y, command);
+    }
+    /// Takes what happened since the tick before. `controlled` holds the controlled states as
+    /// measured; it is replaced by the states that the next command will meet, where the model knows
+    /// better.
+    ///
+    /// The loop calls it before every step of the controller, after [`AffineModel::learn`]; at the
+    /// first tick nothing was asked for or applied before.
+    fn track(&mut self, seen: &Observation<'_, S>, controlled: &mut [S]) {
+        let _ = (seen, controlled);
     }
 }
 

@@ -8,7 +8,7 @@ use crate::config::{ConfigError, Source, Step};
 use crate::excitation::{self, Excitation, Sequence};
 use crate::identification::{Identification, IdentificationError, LearningSettings};
 use crate::limits::{self, LimitSettings};
-use crate::model::{Affine, Model};
+use crate::model::{Affine, Model, Treatment};
 use crate::registry::{
     BuildError, ControllerPart, DriverContext, DriverPart, EstimatorPart, HostDriver,
 };
@@ -125,6 +125,12 @@ impl LoopFile {
             );
             return Err(source.error(&["model".into()], &message, None));
         };
+        let affine = affine.predicting(self.period_s);
+        let mut notes = self.controller.notes();
+        if self.controller.inverts_model() {
+            notes.extend(affine.treatments().iter().map(Treatment::say));
+        }
+        notes.extend(affine.predictor_note());
         let controlled: Vec<&'static Signal> = model
             .plant
             .controlled
@@ -225,7 +231,7 @@ impl LoopFile {
             host,
             controlled,
             references,
-            notes: self.controller.notes(),
+            notes,
         })
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-pub use crate::affine::Affine;
+pub use crate::affine::{Affine, Treatment};
 use crate::attach::{attach, make_names_unique};
 pub use crate::attach::{misfit, unit_at};
 use crate::config::{ConfigError, ReadError, Source, Step, nearest, read_text};

@@ -239,6 +239,11 @@ pub trait ControllerPart: Debug + Send + Sync {
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
+    /// True where the controller inverts the model it is given, so that effects in the model file
+    /// change its commands.
+    fn inverts_model(&self) -> bool {
+        false
+    }
     /// What the design promises: the controlled signals from rest, sampled with `period` (s), for
     /// `references` (one list of samples per controlled signal), without limits or disturbances.
     /// `None` where the design promises nothing of that kind.

@@ -305,16 +305,16 @@ where
         if let Some(limits) = &mut self.reference_limits {
             limits.hold(tick.period, self.reference.as_mut());
         }
+        let seen = Observation {
+            tick,
+            sample,
+            measured: self.measured.as_ref(),
+            command: self.command.as_ref(),
+            applied: self.applied.as_ref(),
+            outcome: self.outcome,
+        };
         let mut event = None;
         if self.index > 0 {
-            let seen = Observation {
-                tick,
-                sample,
-                measured: self.measured.as_ref(),
-                command: self.command.as_ref(),
-                applied: self.applied.as_ref(),
-                outcome: self.outcome,
-            };
             self.observer.observe(&seen);
             event = self.supervisor.judge(
                 &seen,
@@ -330,6 +330,7 @@ where
         for (to, from) in controlled.iter_mut().zip(self.measured.as_ref()) {
             *to = *from;
         }
+        self.model.track(&seen, controlled);
         self.outcome = self
             .controller
             .step(

@@ -323,6 +323,10 @@ impl ControllerPart for FeedbackLinearizingPiSettings {
         Ok(Box::new(controller))
     }
 
+    fn inverts_model(&self) -> bool {
+        true
+    }
+
     fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         match self.demand(None) {

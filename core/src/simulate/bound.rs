@@ -6,43 +6,43 @@ use crate::{Channel, Past, Place, Reading, Role};
 
 /// An effect at one channel.
 #[derive(Clone, Debug)]
-pub(super) struct Bound {
+pub(crate) struct Bound {
     /// Index of the effect in the model.
-    pub(super) effect: usize,
-    pub(super) place: Place,
+    pub(crate) effect: usize,
+    pub(crate) place: Place,
     side: f64,
     is_position: bool,
     reads: [Option<usize>; Role::COUNT],
     /// Signals it reads beside those.
     signals: Vec<usize>,
     /// First of its states in the extended state vector.
-    pub(super) z: usize,
+    pub(crate) z: usize,
     /// Number of its states.
-    pub(super) n_z: usize,
+    pub(crate) n_z: usize,
     /// Index into the histories, for effects with memory.
-    pub(super) history: Option<usize>,
+    pub(crate) history: Option<usize>,
 }
 
 /// All effects of a model by the kind of place they act at, in the model's order.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Bounds {
+pub(crate) struct Bounds {
     /// With memory, on inputs.
-    pub(super) input_memory: Vec<Bound>,
-    pub(super) inputs: Vec<Bound>,
-    pub(super) efforts: Vec<Bound>,
-    pub(super) bodies: Vec<Bound>,
-    pub(super) outputs: Vec<Bound>,
+    pub(crate) input_memory: Vec<Bound>,
+    pub(crate) inputs: Vec<Bound>,
+    pub(crate) efforts: Vec<Bound>,
+    pub(crate) bodies: Vec<Bound>,
+    pub(crate) outputs: Vec<Bound>,
     /// With memory, on outputs.
-    pub(super) output_memory: Vec<Bound>,
+    pub(crate) output_memory: Vec<Bound>,
     /// Number of histories.
-    pub(super) histories: usize,
+    pub(crate) histories: usize,
     /// Number of effect states.
-    pub(super) states: usize,
+    pub(crate) states: usize,
 }
 
 impl Bounds {
     /// Binds the effects of `model`; their states follow the plant's.
-    pub(super) fn of(model: &Model) -> Self {
+    pub(crate) fn of(model: &Model) -> Self {
         let mut bounds = Self::default();
         let first = model.n_states();
         for (index, effect) in model.effects.iter().enumerate() {
@@ -76,7 +76,7 @@ impl Bounds {
     }
 
     /// All of them.
-    pub(super) fn all(&self) -> impl Iterator<Item = &Bound> {
+    pub(crate) fn all(&self) -> impl Iterator<Item = &Bound> {
         self.input_memory
             .iter()
             .chain(&self.inputs)
@@ -87,7 +87,7 @@ impl Bounds {
     }
 
     /// Whether nothing acts within an integration step.
-    pub(super) fn idle(&self) -> bool {
+    pub(crate) fn idle(&self) -> bool {
         self.inputs.is_empty()
             && self.efforts.is_empty()
             && self.bodies.is_empty()
@@ -95,7 +95,7 @@ impl Bounds {
     }
 
     /// Signals that effects acting within a step read.
-    pub(super) fn read(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn read(&self) -> impl Iterator<Item = usize> + '_ {
         self.inputs
             .iter()
             .chain(&self.efforts)
@@ -118,16 +118,16 @@ fn reads_position(model: &Model, channel: &Channel) -> Option<usize> {
 }
 
 /// What an effect is evaluated with.
-pub(super) struct Scene<'a, S> {
-    pub(super) model: &'a Model,
+pub(crate) struct Scene<'a, S> {
+    pub(crate) model: &'a Model,
     /// Parameter values of the whole model.
-    pub(super) values: &'a [S],
+    pub(crate) values: &'a [S],
     /// Extended state.
-    pub(super) x: &'a [S],
-    pub(super) signals: &'a [S],
-    pub(super) time: f64,
+    pub(crate) x: &'a [S],
+    pub(crate) signals: &'a [S],
+    pub(crate) time: f64,
     /// Interval over which a contribution with memory holds.
-    pub(super) interval: (f64, f64),
+    pub(crate) interval: (f64, f64),
 }
 
 impl<S: HostReal> Scene<'_, S> {
@@ -162,7 +162,7 @@ impl<S: HostReal> Scene<'_, S> {
     }
 
     /// What the effect adds to its channel.
-    pub(super) fn contribution(&self, bound: &Bound, nominal: S, past: &dyn Past<S>) -> S {
+    pub(crate) fn contribution(&self, bound: &Bound, nominal: S, past: &dyn Past<S>) -> S {
         S::physics(self.effect(bound).physics).contribution(
             &self.reading(bound, nominal, past),
             &self.x[bound.z..bound.z + bound.n_z],
@@ -171,7 +171,7 @@ impl<S: HostReal> Scene<'_, S> {
     }
 
     /// The rates of its states.
-    pub(super) fn rates(&self, bound: &Bound, nominal: S, past: &dyn Past<S>, dx: &mut [S]) {
+    pub(crate) fn rates(&self, bound: &Bound, nominal: S, past: &dyn Past<S>, dx: &mut [S]) {
         if bound.n_z > 0 {
             S::physics(self.effect(bound).physics).state_derivative(
                 &self.reading(bound, nominal, past),
@@ -183,7 +183,7 @@ impl<S: HostReal> Scene<'_, S> {
     }
 
     /// Its states at the start of a run, into `z`.
-    pub(super) fn initial(&self, bound: &Bound, nominal: S, past: &dyn Past<S>, z: &mut [S]) {
+    pub(crate) fn initial(&self, bound: &Bound, nominal: S, past: &dyn Past<S>, z: &mut [S]) {
         S::physics(self.effect(bound).physics).initial_state(
             &self.reading(bound, nominal, past),
             self.parameters(bound),

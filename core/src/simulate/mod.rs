@@ -1,12 +1,13 @@
 //! A composed model in motion: the free run that everything is judged by.
 
-mod bound;
+pub(crate) mod bound;
 mod follow;
 mod history;
 mod observer;
 mod push;
 mod ramp;
 mod sensing;
+mod values;
 
 use std::borrow::Cow;
 
