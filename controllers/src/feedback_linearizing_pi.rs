@@ -11,7 +11,7 @@ mod design_error;
 mod settings;
 pub use design_error::DesignError;
 #[cfg(feature = "std")]
-pub use settings::{FeedbackLinearizingPiSettings, PerChannel};
+pub use settings::FeedbackLinearizingPiSettings;
 
 /// State feedback that makes each controlled state one integrator, and a PI law around each.
 ///

@@ -2,49 +2,14 @@
 
 use loopsight_core::model::Model;
 use loopsight_core::registry::{BuildError, ControllerPart, PartMeta, Setting};
-use loopsight_core::{AffineModel, Controller, declare_part};
+use loopsight_core::{Controller, declare_part};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::{DesignError, FeedbackLinearizingPi};
-use crate::{PiResponse, Rule, SampledPi, Singular, gains, solve};
-
-/// One number for all channels, or a list of one per channel.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(
-    untagged,
-    expecting = "expected a number, or a list of numbers, one per channel"
-)]
-pub enum PerChannel {
-    /// The same for all.
-    All(f64),
-    /// One each, in the order of the controlled states or inputs.
-    Each(Vec<f64>),
-}
-
-impl PerChannel {
-    /// The numbers one by one; a single one where it holds for all.
-    fn listed(&self) -> &[f64] {
-        match self {
-            PerChannel::All(value) => std::slice::from_ref(value),
-            PerChannel::Each(values) => values,
-        }
-    }
-
-    fn expand(&self, key: &str, n: usize) -> Result<DVector<f64>, BuildError> {
-        match self {
-            PerChannel::All(value) => Ok(DVector::repeat(n, *value)),
-            PerChannel::Each(values) if values.len() == n => Ok(DVector::from_column_slice(values)),
-            PerChannel::Each(values) => Err(BuildError::at(
-                key,
-                format!(
-                    "`{key}` has {} numbers, expected one, or a list of {n}",
-                    values.len()
-                ),
-            )),
-        }
-    }
-}
+use crate::at_rest::at_rest;
+use crate::per_channel::PerChannel;
+use crate::{PiResponse, Rule, SampledPi, gains};
 
 /// What the TOML table of `feedback_linearizing_pi` holds: gains, or what they follow from, or an
 /// acceleration without feedback.
@@ -229,62 +194,6 @@ impl FeedbackLinearizingPiSettings {
     }
 }
 
-/// Refuses a model that cannot be inverted at rest.
-fn check_invertible(model: &Model) -> Result<usize, BuildError> {
-    let plant = model.plant;
-    let Some(mut affine) = model.affine() else {
-        return Err(BuildError::at(
-            "",
-            format!(
-                "`{}` needs a control-affine plant, but `{}` declares no controlled states",
-                META.id, plant.id
-            ),
-        ));
-    };
-    let n = affine.size();
-    let (mut drift, mut matrix) = (vec![f64::NAN; n], vec![f64::NAN; n * n]);
-    affine.evaluate(&vec![0.0; n], &mut drift, &mut matrix);
-    let shown: Vec<&[f64]> = matrix.chunks(n.max(1)).collect();
-    let shown = format!("G = {shown:?}");
-    let state = |row: usize| {
-        plant
-            .controlled
-            .get(row)
-            .map_or("?", |s| plant.states[*s].id)
-    };
-    let message = match solve(&mut matrix.clone(), &mut drift, &mut vec![0.0; n]) {
-        Ok(()) => return Ok(n),
-        Err(Singular::Row(row)) => format!("no input moves `{}`", state(row)),
-        Err(Singular::Column(column)) => format!(
-            "`{}` moves none of the controlled states",
-            plant.inputs.get(column).map_or("?", |s| s.id)
-        ),
-        Err(Singular::Dependent(pivot)) => format!(
-            "the inputs do not move the controlled states independently (scaled pivot {pivot:.1e}, \
-             expected at least 1e-6)"
-        ),
-        Err(Singular::NotFinite) => {
-            let missing = model.missing_values();
-            return Err(BuildError::at(
-                "",
-                if missing.is_empty() {
-                    format!("the model of `{}` is not finite at rest, {shown}", plant.id)
-                } else {
-                    format!("the model has no value for {}", missing.join(", "))
-                },
-            )
-            .help("fit the model first, or give the values in the model file"));
-        }
-    };
-    Err(BuildError::at(
-        "",
-        format!(
-            "the input matrix of `{}` cannot be inverted: {message}; {shown}",
-            plant.id
-        ),
-    ))
-}
-
 #[typetag::serde(name = "feedback_linearizing_pi")]
 impl ControllerPart for FeedbackLinearizingPiSettings {
     fn meta(&self) -> &'static PartMeta {
@@ -292,7 +201,7 @@ impl ControllerPart for FeedbackLinearizingPiSettings {
     }
 
     fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError> {
-        let n = check_invertible(model)?;
+        let n = at_rest(model, META.id)?.n;
         let limit = match &self.limit {
             None => DVector::repeat(n, f64::INFINITY),
             Some(limit) => limit.expand("limit", n)?,
