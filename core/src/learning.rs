@@ -124,15 +124,18 @@ impl Default for Guards {
     }
 }
 
+/// Share of the least excitation below which a direction counts as absent.
+const ABSENT: f64 = 0.1;
+
 /// An estimator that works in scaled parameters, learns only when a sample is worth it, and stays
 /// in range.
 ///
 /// ```text
 /// θ_i = s_i ϑ_i      ψ_i = s_i φ_i      y = ψᵀϑ      e = y - ψᵀϑ̂
 /// M ← M + (ψψᵀ - M)/W      M = Q diag(m) Qᵀ                              excitation
-/// ψ' = Σ q_i q_iᵀψ over the i with √m_i ≥ m₀                             directions worth learning
+/// ψ' = Σ q_i q_iᵀψ over the i with √m_i ≥ m₀; nothing is learned where |ψ'| < m₀
 /// e' = e - δ sign e where |e| > δ, else nothing is learned              dead zone
-/// the estimator takes  y' = ψ'ᵀϑ̂ + e'  with  ψ'
+/// the estimator takes  y' = ψ'ᵀϑ̂ + e'  with  ψ'; of the change of ϑ̂, the part along q_i with √m_i ≥ m₀/10
 /// ϑ̂ ← arg min (ϑ - ϑ̂)ᵀ P⁻¹ (ϑ - ϑ̂)  subject to  low ≤ s ϑ ≤ high        projection
 /// ```
 ///
@@ -147,7 +150,10 @@ impl Default for Guards {
 /// **Excitation.** `√m_i` is by how much `y` changes, rms over the window, when the parameters change
 /// along `q_i` by one scale in all. The least of them is [`Guarded::excitation`]. What is not excited is
 /// taken as known: noise in a regressor of a robot that stands, or drives straight ahead, teaches
-/// nothing, and the other directions go on learning.
+/// nothing, and the other directions go on learning. A sample that is itself that small teaches nothing
+/// either, however lively the window before it was. Through its correlation with what is excited, the
+/// estimate still moves along a direction that is not; along one that is as good as absent
+/// (`√m_i < m₀/10`) it does not move at all, and the prediction is none the worse for it.
 ///
 /// **Projection** is in the metric of the covariance: what one parameter is held back by, the others
 /// that are correlated with it make up for. Taking each to its bound on its own would spoil a good
@@ -179,7 +185,7 @@ where
     covariance: OMatrix<S, D, D>,
     noise: S,
     lessons: S,
-    /// `ψ`, `ψ'` or `ϑ`, multipliers.
+    /// `ψ`, then `ψ'`, changes or `ϑ`; `ϑ` before the update; scratch.
     work: [OVector<S, D>; 3],
 }
 
@@ -237,7 +243,7 @@ where
         if regressor.len() != self.theta.len() {
             return Lesson::none(Withheld::NotFinite);
         }
-        let [psi, part, _] = &mut self.work;
+        let [psi, _, scratch] = &mut self.work;
         let mut innovation = measurement;
         for (i, phi) in regressor.iter().enumerate() {
             psi[i] = *phi * self.scale[i];
@@ -259,10 +265,10 @@ where
             return lesson;
         }
         let least = S::of(self.guards.least_excitation);
-        if !self
-            .information
-            .excited(psi.as_slice(), least, part.as_mut_slice())
-        {
+        let (psi, scratch) = (psi.as_mut_slice(), scratch.as_mut_slice());
+        self.information.part(psi, least, scratch);
+        let square = psi.iter().fold(S::zero(), |sum, v| sum + *v * *v);
+        if square < least * least || square == S::zero() {
             lesson.withheld = Some(Withheld::Unexcited);
             return lesson;
         }
@@ -272,19 +278,40 @@ where
             return lesson;
         }
         let beyond = innovation - innovation.held(-zone, zone);
-        let known: S =
-            (part.iter().zip(self.estimator.theta())).fold(S::zero(), |sum, (p, t)| sum + *p * *t);
-        let told = self.estimator.update(part.as_slice(), known + beyond);
+        let known =
+            (psi.iter().zip(self.estimator.theta())).fold(S::zero(), |sum, (p, t)| sum + *p * *t);
+        self.work[1]
+            .as_mut_slice()
+            .copy_from_slice(self.estimator.theta());
+        let told = self
+            .estimator
+            .update(self.work[0].as_slice(), known + beyond);
         if !told.accepted {
             lesson.withheld = Some(Withheld::NotFinite);
             return lesson;
         }
+        self.turn_back(least * S::of(ABSENT));
         lesson.relative_variance = told.relative_variance;
         self.lessons = (self.lessons + S::one()).smaller(S::of(self.guards.window));
         let square = innovation * innovation / told.relative_variance;
         self.noise += (square - self.noise) / self.lessons;
         lesson.projected = self.hold();
         lesson
+    }
+
+    /// Undoes what the update moved along directions that are excited less than `least`.
+    fn turn_back(&mut self, least: S) {
+        let [change, before, scratch] = &mut self.work;
+        for (i, now) in self.estimator.theta().iter().enumerate() {
+            change[i] = *now - before[i];
+        }
+        let (change, scratch) = (change.as_mut_slice(), scratch.as_mut_slice());
+        if self.information.part(change, least, scratch) {
+            for (to, by) in before.iter_mut().zip(change.iter()) {
+                *to += *by;
+            }
+            self.estimator.set_theta(before.as_slice());
+        }
     }
 
     /// Brings the estimate into its range, and shows it in the parameters' units.

@@ -24,7 +24,8 @@ pub struct LearningSettings {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub dead_zone: BTreeMap<String, f64>,
     /// By signal, least excitation of a direction that is learned (see [`crate::learning::Guarded`]),
-    /// in its unit per second. Default: a tenth of the signal's size per second.
+    /// in its unit per second. Default: a twentieth of the signal's size per
+    /// second.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub least_excitation: BTreeMap<String, f64>,
     /// Time over which excitation and noise are averaged, s. Default: 2 s.
@@ -39,7 +40,7 @@ pub struct LearningSettings {
 }
 
 /// Size of an excitation that is told from noise, in sizes of the signal per second.
-const LEAST_EXCITATION: f64 = 0.1;
+const LEAST_EXCITATION: f64 = 0.05;
 
 impl Default for LearningSettings {
     fn default() -> Self {

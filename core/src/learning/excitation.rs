@@ -131,31 +131,26 @@ where
         }
     }
 
-    /// The part of `psi` along directions with `√m ≥ least`; false where there is none.
-    pub(super) fn excited(&self, psi: &[S], least: S, part: &mut [S]) -> bool {
+    /// Replaces `vector` by its part along directions with `√m ≥ least`; false, and nothing is touched,
+    /// where that is all of it: every direction is excited.
+    pub(super) fn part(&self, vector: &mut [S], least: S, scratch: &mut [S]) -> bool {
         let floor = least * least;
-        let all = self.values.iter().all(|m| *m >= floor);
-        if all {
-            // To the last digit: what is excited everywhere is not touched.
-            part.copy_from_slice(psi);
-            return psi.iter().any(|v| *v != S::zero());
+        if self.values.iter().all(|m| *m >= floor) {
+            return false;
         }
-        part.fill(S::zero());
-        let mut any = false;
+        scratch.fill(S::zero());
         for (i, m) in self.values.iter().enumerate() {
             if *m >= floor {
                 let direction = self.directions.column(i);
-                let along = direction
-                    .iter()
-                    .zip(psi)
+                let along = (direction.iter().zip(vector.iter()))
                     .fold(S::zero(), |sum, (d, v)| sum + *d * *v);
-                any |= along != S::zero();
-                for (to, d) in part.iter_mut().zip(direction.iter()) {
+                for (to, d) in scratch.iter_mut().zip(direction.iter()) {
                     *to += along * *d;
                 }
             }
         }
-        any
+        vector.copy_from_slice(scratch);
+        true
     }
 
     /// `√m` of the least excited direction.
