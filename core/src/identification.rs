@@ -57,7 +57,7 @@ impl Identification {
         settings: &LearningSettings,
         period: f64,
     ) -> Result<Self, IdentificationError> {
-        let regression = Regression::new(model, scheme)?;
+        let regression = Regression::with_effects(model, scheme, period)?;
         settings
             .check(model)
             .map_err(IdentificationError::Learning)?;
@@ -159,6 +159,7 @@ impl Identification {
             }
             self.values[j] = sum / weights;
         }
+        self.regression.set_values(&self.values);
     }
 }
 
@@ -167,7 +168,7 @@ impl Observer<f64> for Identification {
         let withheld = Withheld::by(&seen.sample, seen.outcome, self.settings.while_saturated);
         if withheld == Some(Withheld::Stale) {
             // A late answer would teach the regression a wrong rate.
-            self.regression.restart();
+            self.regression.pass_over(seen.applied);
             for row in &mut self.rows {
                 row.lesson = Lesson::none(Withheld::Stale);
             }

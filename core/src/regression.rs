@@ -1,5 +1,7 @@
 //! The equations of a plant as linear regressions in its parameters.
 
+mod acting;
+
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -7,6 +9,7 @@ use crate::Dynamics;
 use crate::model::{Model, pseudo_inverse};
 use crate::registry::HostReal;
 use crate::run::Hold;
+use acting::Acting;
 
 /// How a regression is made from samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,6 +47,17 @@ pub enum RegressionError {
 /// The regressors come from the plant's own equations: `φ_j` is the change of the state's rate when
 /// parameter `j` alone is one, so estimators, fits and the plant cannot disagree. Nothing is
 /// allocated after construction.
+///
+/// **Effects** ([`Regression::with_effects`]). A friction level at a wheel multiplies the motor's gain:
+/// both are linear, their product is not. So the equations, effects included, are taken at the present
+/// values `θ̂` ([`Regression::set_values`]), which loses nothing where they are linear:
+///
+/// ```text
+/// φ_j = (f(θ̂ + s_j e_j) - f(θ̂))/s_j        y = Δx/Δt - f(θ̂) + φᵀθ̂
+/// ```
+///
+/// Reference: L. Ljung, T. Söderström (1983), "Theory and Practice of Recursive Identification", section
+/// 3.6 (recursive prediction errors: the gradient at the present estimate).
 #[derive(Clone)]
 pub struct Regression {
     model: Model,
@@ -60,10 +74,12 @@ pub struct Regression {
     x_middle: Vec<f64>,
     input_before: Vec<f64>,
     input_mean: Vec<f64>,
+    input_now: Vec<f64>,
     p: Vec<f64>,
     dx: Vec<f64>,
     w: Vec<f64>,
     values: Vec<f64>,
+    acting: Option<Acting>,
 }
 
 #[derive(Clone, Copy)]
@@ -114,6 +130,7 @@ impl Regression {
             x_middle: vec![0.0; nx],
             input_before: vec![0.0; model.plant.inputs.len()],
             input_mean: vec![0.0; model.plant.inputs.len()],
+            input_now: vec![0.0; model.plant.inputs.len()],
             p: vec![0.0; model.plant.parameters.len()],
             dx: vec![0.0; nx],
             w: vec![0.0; model.n_efforts()],
@@ -122,9 +139,62 @@ impl Regression {
             offset,
             base,
             model: model.clone(),
+            acting: None,
         };
         regression.find_rows();
         Ok(regression)
+    }
+
+    /// The regressions of `model` with its effects, in those free parameters that enter linearly; the
+    /// others keep their values. `period` (s) is that of the loop. Where nothing acts between command
+    /// and rate it is that of [`Regression::new`].
+    pub fn with_effects(
+        model: &Model,
+        scheme: Scheme,
+        period: f64,
+    ) -> Result<Self, RegressionError> {
+        let mut linear = model.clone();
+        for parameter in &mut linear.parameters {
+            parameter.free &= parameter.declaration.linear || parameter.value.is_none();
+        }
+        let mut regression = Self::new(&linear, scheme)?;
+        let values: Vec<f64> = (linear.parameters.iter())
+            .map(|p| p.value.unwrap_or(0.0))
+            .collect();
+        regression.acting = Acting::new(&linear, &values, period);
+        regression.rows.clear();
+        regression.find_rows();
+        Ok(regression)
+    }
+
+    /// The values of all parameters at which the effects are taken from now on; ignored for another
+    /// number of them.
+    pub fn set_values(&mut self, values: &[f64]) {
+        if let Some(acting) = &mut self.acting
+            && acting.values.len() == values.len()
+        {
+            acting.values.copy_from_slice(values);
+        }
+    }
+
+    /// A period whose sample is no use: what was applied in it is still under way where inputs are
+    /// late.
+    pub fn pass_over(&mut self, input: &[f64]) {
+        self.previous = None;
+        if input.len() == self.input_mean.len() && input.iter().all(|v| v.is_finite()) {
+            self.take_input(None, input);
+        }
+    }
+
+    /// Follows what was applied through the effects that make it late, into `input_now`.
+    fn take_input(&mut self, span: Option<f64>, input: &[f64]) {
+        self.input_now.copy_from_slice(input);
+        if let Some(acting) = &mut self.acting {
+            let dynamics: &dyn Dynamics<f64> = f64::dynamics(self.model.dynamics);
+            let of_plant = &acting.values[..self.model.n_plant_parameters];
+            dynamics.lower(self.model.set, of_plant, &mut self.p);
+            acting.follow(&self.model, &self.p, span, &mut self.input_now);
+        }
     }
 
     /// A parameter belongs to a row when it moves that state's rate anywhere: tried at a few
@@ -158,17 +228,29 @@ impl Regression {
         }
     }
 
+    /// The rate at `x`: without effects that of the base values, or of those with parameter `unit` at
+    /// one; with them that of the present values, or of those with parameter `unit` one scale more.
     fn rate(&mut self, x: &[f64], u: &[f64], unit: Option<usize>) {
+        let dynamics: &dyn Dynamics<f64> = f64::dynamics(self.model.dynamics);
+        let (model, n) = (&self.model, self.model.n_plant_parameters);
+        if let Some(acting) = &mut self.acting {
+            let kept = unit.map(|j| (j, acting.values[j]));
+            if let Some((j, value)) = kept {
+                acting.values[j] = value + model.parameters[j].scale();
+            }
+            dynamics.lower(model.set, &acting.values[..n], &mut self.p);
+            let (w, dx) = (&mut self.w, &mut self.dx);
+            acting.rate(model, dynamics, (x, u), &self.p, w, dx);
+            if let Some((j, value)) = kept {
+                acting.values[j] = value;
+            }
+            return;
+        }
         self.values.copy_from_slice(&self.base);
         if let Some(j) = unit {
             self.values[j] = 1.0;
         }
-        let dynamics: &dyn Dynamics<f64> = f64::dynamics(self.model.dynamics);
-        dynamics.lower(
-            self.model.set,
-            &self.values[..self.model.n_plant_parameters],
-            &mut self.p,
-        );
+        dynamics.lower(model.set, &self.values[..n], &mut self.p);
         dynamics.derivative(x, u, &self.w, &self.p, &mut self.dx);
     }
 
@@ -176,7 +258,11 @@ impl Regression {
         self.rate(x, u, None);
         let zero = self.dx[state];
         self.rate(x, u, Some(j));
-        self.dx[state] - zero
+        let change = self.dx[state] - zero;
+        match self.acting {
+            Some(_) => change / self.model.parameters[j].scale(),
+            None => change,
+        }
     }
 
     /// How the `index`-th input runs between samples: what [`Regression::push`] wants is its mean.
@@ -227,16 +313,19 @@ impl Regression {
         }
         self.to_state.mul_to(&self.difference, &mut self.x);
         let mut ready = false;
-        let mut period = None;
-        if let Some(before) = self.previous {
-            let step = time - before.time;
-            if step > 0.0 {
-                period = Some(step);
-                ready = self.fill(step, before.period, input);
-            }
+        let step = self.previous.map(|before| time - before.time);
+        let period = step.filter(|step| *step > 0.0);
+        self.take_input(period, input);
+        let input = core::mem::take(&mut self.input_now);
+        if let (Some(step), Some(before)) = (period, self.previous) {
+            ready = self.fill(step, before.period, &input);
         }
         self.x_before.copy_from_slice(self.x.as_slice());
-        self.input_before.copy_from_slice(input);
+        self.input_before.copy_from_slice(&input);
+        self.input_now = input;
+        if let Some(acting) = &mut self.acting {
+            acting.remember(self.x.as_slice());
+        }
         self.previous = Some(Previous { time, period });
         ready
     }
@@ -284,6 +373,11 @@ impl Regression {
                 drift += weight * self.dx[row.state];
                 for (phi, &j) in row.phi.iter_mut().zip(&row.parameters) {
                     *phi += weight * self.regressor(point, &u, row.state, j);
+                }
+            }
+            if let Some(acting) = &self.acting {
+                for (phi, j) in row.phi.iter().zip(&row.parameters) {
+                    drift -= phi * acting.values[*j];
                 }
             }
             row.y = (after[row.state] - before[row.state]) / distance - drift;

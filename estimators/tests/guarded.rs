@@ -1,6 +1,10 @@
 //! Laws of estimators under guard, in single precision, as they run on a robot.
 
 #![allow(
+    clippy::needless_range_loop,
+    reason = "matrix arithmetic reads best with its indices"
+)]
+#![allow(
     clippy::unwrap_used,
     reason = "what is built here is right, and a panic is how this program fails"
 )]

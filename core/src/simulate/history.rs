@@ -11,7 +11,7 @@ const SHORT: f64 = 1e-6;
 
 /// How a signal runs between two instants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Between {
+pub(crate) enum Between {
     /// Constant: an input that is held.
     Held,
     /// Smooth: the integral is the cubic through its values and rates at both ends.
@@ -20,7 +20,7 @@ pub(super) enum Between {
 
 /// The past of a signal, kept in a ring so that it never grows.
 #[derive(Clone, Debug)]
-pub(super) struct History<S> {
+pub(crate) struct History<S> {
     between: Between,
     entries: Vec<Entry<S>>,
     /// Index of the oldest entry once the ring is full.
@@ -36,7 +36,7 @@ struct Entry<S> {
 }
 
 impl<S: HostReal> History<S> {
-    pub(super) fn new(between: Between) -> Self {
+    pub(crate) fn new(between: Between) -> Self {
         Self {
             between,
             entries: Vec::with_capacity(CAPACITY),
@@ -44,7 +44,7 @@ impl<S: HostReal> History<S> {
         }
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.entries.clear();
         self.oldest = 0;
     }
@@ -60,7 +60,7 @@ impl<S: HostReal> History<S> {
     }
 
     /// From `time` on the signal has `value`, and is held.
-    pub(super) fn hold(&mut self, time: f64, value: S) {
+    pub(crate) fn hold(&mut self, time: f64, value: S) {
         let n = self.entries.len();
         let integral = if n == 0 {
             S::zero()
@@ -76,7 +76,7 @@ impl<S: HostReal> History<S> {
     }
 
     /// At `time` the signal has `value`, and its integral is `integral`.
-    pub(super) fn pass(&mut self, time: f64, value: S, integral: S) {
+    pub(crate) fn pass(&mut self, time: f64, value: S, integral: S) {
         self.push(Entry {
             time,
             value,

@@ -2,7 +2,7 @@
 
 pub(crate) mod bound;
 mod follow;
-mod history;
+pub(crate) mod history;
 mod observer;
 mod push;
 mod ramp;
