@@ -131,6 +131,22 @@ impl Identification {
         self.rows[row].lesson
     }
 
+    /// Plain statements, for reports: which of the parameters that a fit would estimate in `model` are
+    /// not learned here, and why.
+    pub fn notes(&self, model: &Model) -> Vec<String> {
+        let free = model.parameters.iter().enumerate().filter(|(_, p)| p.free);
+        free.filter(|(j, _)| !self.learned.contains(j))
+            .map(|(_, parameter)| {
+                let why = if parameter.declaration.linear {
+                    "it does not show in the rates of the controlled signals"
+                } else {
+                    "it enters non-linearly"
+                };
+                format!("not learned: {}, because {why}", parameter.name)
+            })
+            .collect()
+    }
+
     /// Present values of all parameters of the model: the learned ones as they are estimated, the
     /// others as they were.
     pub fn values(&self) -> &[f64] {
@@ -146,18 +162,19 @@ impl Identification {
     /// weighted with the inverse of its variance; where a row knows none, alike.
     fn gather(&mut self) {
         for &j in &self.learned {
-            let (mut sum, mut weights) = (0.0, 0.0);
+            let (mut mean, mut weights) = (0.0, 0.0);
             for (row, of) in self.rows.iter().enumerate() {
                 let parameters = self.regression.parameters(row);
                 if let Some(k) = parameters.iter().position(|p| *p == j) {
                     let deviation = of.estimator.deviation(k);
                     let weight = (deviation * deviation).recip();
                     let weight = if weight.is_normal() { weight } else { 1e-12 };
-                    sum += weight * of.estimator.theta()[k];
                     weights += weight;
+                    // Not a digit of what a single row says is lost.
+                    mean += weight / weights * (of.estimator.theta()[k] - mean);
                 }
             }
-            self.values[j] = sum / weights;
+            self.values[j] = mean;
         }
         self.regression.set_values(&self.values);
     }

@@ -194,6 +194,9 @@ impl LoopFile {
                 )
             }
         };
+        if let Some(identification) = &identification {
+            notes.extend(identification.notes(model));
+        }
         let (input_limits, reference_limits) =
             limits::build(&self.limits, model.plant.inputs, &signals)
                 .map_err(|e| placed(source, &["limits".into()], e))?;

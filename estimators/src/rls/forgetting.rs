@@ -112,7 +112,7 @@ mod tests {
         println!(
             "before: {quiet:.2e} constant, {before:.2e} variable; after: {slow:.2e}, {after:.2e}"
         );
-        assert!(after < 0.3 * slow, "{after:e} against {slow:e}");
+        assert!(after < 0.6 * slow, "{after:e} against {slow:e}");
         assert!(before < 2.0 * quiet, "{before:e} against {quiet:e}");
     }
 

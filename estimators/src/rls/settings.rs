@@ -35,7 +35,7 @@ pub struct RlsSettings {
     pub forgetting: f64,
     /// What is forgotten; all but `constant` need a `forgetting` below 1.
     pub rule: Forgetting,
-    /// `λ_min` of the rule `variable`; `None` for `λ^30`: a thirtieth of the memory.
+    /// `λ_min` of the rule `variable`; `None` for `λ^10`: a tenth of the memory.
     #[cfg_attr(feature = "std", serde(skip_serializing_if = "Option::is_none"))]
     pub least_forgetting: Option<f64>,
     /// The covariance starts as this multiple of the identity. Large against
@@ -71,7 +71,7 @@ impl RlsSettings {
         }
         let least = self
             .least_forgetting
-            .unwrap_or((0..30).fold(1.0, |power, _| power * lambda));
+            .unwrap_or((0..10).fold(1.0, |power, _| power * lambda));
         if self.least_forgetting.is_some() && !(least > 0.0 && least <= lambda) {
             return Err(RlsError::LeastForgetting(least));
         }
@@ -190,7 +190,7 @@ mod part {
                 "least_forgetting",
                 "1",
                 "least weight of the rule \"variable\", above 0 and up to `forgetting`; default: its \
-                 thirtieth power",
+                 tenth power",
             ),
             Setting::new(
                 "initial_covariance",
