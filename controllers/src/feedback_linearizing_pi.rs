@@ -18,7 +18,7 @@ pub use settings::FeedbackLinearizingPiSettings;
 /// ```text
 /// u   = G(ȳ)⁻¹ (ν - f(ȳ)),  ȳ = y + ν T/2     makes  y' = f + G u  into  y' = ν      (48)
 /// V   = E⁻¹(u)                                 undoes what lies between command and plant
-/// ν_k = k_p (β r_k - y_k) + z_k                                                      (49)
+/// ν_k = k_p (β r_k - y_k) + z_k  [+ (r_k - r_{k-1})/T]                                (49)
 /// z_{k+1} = z_k + k_i T (r_k - y_k) + k_i T/(k_p β) (ν_a - ν_k)
 /// V_a = V held within ±V_max,  ν_a = f(ȳ) + G(ȳ) E(V_a),  ȳ = y + ν_a T/2
 /// ```
@@ -38,6 +38,10 @@ pub use settings::FeedbackLinearizingPiSettings;
 /// the middle `ȳ` of the period, where `y` will be if `y' = ν` (the implicit midpoint rule), the
 /// shortfall is `(A T)²/12`, 0.2 %, for one evaluation of the model all the same. What is left is
 /// `y_{k+1} = y_k + T ν_k`, for which [`SampledPi`] equals `H(s)` at every sample.
+///
+/// **Feedforward.** With [`FeedbackLinearizingPi::feeding_forward`] the rate of the reference is added
+/// to `ν` (in brackets above): a smooth reference is then followed without waiting for an error, and
+/// what is left says how wrong the model is. A step has no rate: with steps leave it out.
 ///
 /// **Limits.** Each input is clipped by itself, as an amplifier does it. The last term of `z` is
 /// Hanus' conditioning (back-calculation with the time constant `K_p/K_i`): the integral runs as if
@@ -80,6 +84,8 @@ where
     law: Law<S, D>,
     limit: OVector<S, D>,
     period: S,
+    /// Where the rate of the reference is fed forward, the last reference; NaN at the start.
+    forward: Option<OVector<S, D>>,
     /// The last command that could be computed; zero at the start.
     safe: OVector<S, D>,
     demand: OVector<S, D>,
@@ -178,6 +184,7 @@ where
             law,
             limit: limit.map(S::of),
             period: S::of(period),
+            forward: None,
             safe: zero.clone(),
             demand: zero.clone(),
             middle: zero.clone(),
@@ -188,6 +195,14 @@ where
             matrix: OMatrix::zeros_generic(dim, dim),
             factors: OMatrix::zeros_generic(dim, dim),
         })
+    }
+
+    /// The same, with the rate of the reference fed forward.
+    #[must_use]
+    pub fn feeding_forward(mut self) -> Self {
+        let (dim, one) = self.limit.shape_generic();
+        self.forward = Some(OVector::from_element_generic(dim, one, S::of(f64::NAN)));
+        self
     }
 
     /// The acceleration asked for at the last step, one per controlled state.
@@ -236,6 +251,13 @@ where
                 } => proportional[i] * (weight[i] * reference[i] - measured[i]) + z[i],
                 Law::OpenLoop(acceleration) => acceleration[i],
             };
+            if let Some(before) = &mut self.forward {
+                let rate = (reference[i] - before[i]) / self.period;
+                before[i] = reference[i];
+                if rate.is_finite() {
+                    self.demand[i] += rate;
+                }
+            }
             self.middle[i] = measured[i] + half * self.demand[i];
             self.aim[i] = match &self.law {
                 Law::Pi { .. } => reference[i],
@@ -317,6 +339,9 @@ where
         if let Law::Pi { z, .. } = &mut self.law {
             z.fill(S::zero());
         }
+        if let Some(before) = &mut self.forward {
+            before.fill(S::of(f64::NAN));
+        }
         self.safe.fill(S::zero());
         self.demand.fill(S::zero());
     }
@@ -342,153 +367,4 @@ fn accelerate<S: Real, D: Dim>(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::{Const, DVector, Dyn, Vector2};
-
-    /// The paper's robot; `gain` scales its input matrix.
-    struct Robot {
-        gain: f64,
-    }
-
-    impl AffineModel<f64> for Robot {
-        fn size(&self) -> usize {
-            2
-        }
-        fn evaluate(&mut self, y: &[f64], drift: &mut [f64], input_matrix: &mut [f64]) {
-            drift[0] = -15.146 * y[0] + 0.005 * y[1] * y[1];
-            drift[1] = -9.573 * y[1] - 3.945 * y[0] * y[1];
-            let (k_c, k_f) = (0.136 * self.gain, 0.656 * self.gain);
-            input_matrix.copy_from_slice(&[k_c, k_c, k_f, -k_f]);
-        }
-    }
-
-    const TICK: Tick<f64> = Tick {
-        index: 0,
-        time: 0.0,
-        period: 0.01,
-    };
-
-    fn velocity_loop(limit: f64) -> FeedbackLinearizingPi<f64, Const<2>> {
-        FeedbackLinearizingPi::new(
-            &Vector2::repeat(17.78),
-            &Vector2::repeat(79.01),
-            &Vector2::repeat(limit),
-            0.01,
-        )
-        .unwrap()
-    }
-
-    #[test]
-    fn fixed_and_run_time_sizes_give_the_same_digits() {
-        let mut fixed = velocity_loop(6.0);
-        let mut dynamic: FeedbackLinearizingPi<f64, Dyn> = FeedbackLinearizingPi::new(
-            &DVector::repeat(2, 17.78),
-            &DVector::repeat(2, 79.01),
-            &DVector::repeat(2, 6.0),
-            0.01,
-        )
-        .unwrap();
-        let mut robot = Robot { gain: 1.0 };
-        for k in 0..200 {
-            let measured = [0.01 * f64::from(k % 17), -0.1 * f64::from(k % 5)];
-            let (mut a, mut b) = ([0.0; 2], [0.0; 2]);
-            let said = fixed.step(&TICK, &[0.1, 0.5], &measured, &mut robot, &mut a);
-            let also = dynamic.step(&TICK, &[0.1, 0.5], &measured, &mut robot, &mut b);
-            assert_eq!((said, a), (also, b));
-        }
-    }
-
-    #[test]
-    fn the_inverse_gives_the_acceleration_asked_for() {
-        let mut controller = FeedbackLinearizingPi::<f64, _>::open_loop(
-            &Vector2::new(0.6, -1.6),
-            &Vector2::repeat(f64::INFINITY),
-            0.01,
-        )
-        .unwrap();
-        let (measured, mut volts) = ([0.1, 0.3], [0.0; 2]);
-        let mut robot = Robot { gain: 1.0 };
-        controller
-            .step(&TICK, &[0.0; 2], &measured, &mut robot, &mut volts)
-            .unwrap();
-        let (mut f, mut g) = ([0.0; 2], [0.0; 4]);
-        robot.evaluate(&[0.1 + 0.003, 0.3 - 0.008], &mut f, &mut g);
-        assert!((f[0] + g[0] * volts[0] + g[1] * volts[1] - 0.6).abs() < 1e-12);
-        assert!((f[1] + g[2] * volts[0] + g[3] * volts[1] + 1.6).abs() < 1e-12);
-    }
-
-    #[test]
-    fn what_cannot_be_computed_holds_the_last_command() {
-        let mut controller = velocity_loop(12.0);
-        let mut command = [f64::NAN; 2];
-        let nan = [f64::NAN, 0.0];
-        let mut step = |measured: [f64; 2], gain: f64, reference: [f64; 2]| {
-            let said = controller
-                .step(
-                    &TICK,
-                    &reference,
-                    &measured,
-                    &mut Robot { gain },
-                    &mut command,
-                )
-                .unwrap();
-            (said, command)
-        };
-        let held = Command {
-            saturated: false,
-            held: true,
-        };
-        assert_eq!(step(nan, 1.0, [0.1, 0.0]), (held, [0.0; 2]));
-        let (said, good) = step([0.05, 0.0], 1.0, [0.1, 0.0]);
-        assert_eq!(said, Command::default());
-        assert_eq!(step(nan, 1.0, [0.1, 0.0]), (held, good));
-        assert_eq!(step([0.05, 0.0], 0.0, [0.1, 0.0]), (held, good));
-        assert_eq!(step([0.05, 0.0], f64::NAN, [0.1, 0.0]), (held, good));
-        assert_eq!(step([0.05, 0.0], 1.0, [0.1, f64::INFINITY]), (held, good));
-        // The integral waited: the next good step is the second one.
-        let mut untouched = velocity_loop(12.0);
-        let mut expected = [0.0; 2];
-        for _ in 0..2 {
-            untouched
-                .step(
-                    &TICK,
-                    &[0.1, 0.0],
-                    &[0.05, 0.0],
-                    &mut Robot { gain: 1.0 },
-                    &mut expected,
-                )
-                .unwrap();
-        }
-        assert_eq!(step([0.05, 0.0], 1.0, [0.1, 0.0]).1, expected);
-    }
-
-    #[test]
-    fn slices_of_other_lengths_are_refused() {
-        let mut controller = velocity_loop(12.0);
-        let mut robot = Robot { gain: 1.0 };
-        let said = controller.step(&TICK, &[0.1], &[0.0; 2], &mut robot, &mut [0.0; 2]);
-        assert_eq!(said, Err(ControlError::Sizes));
-        let said = controller.step(&TICK, &[0.1; 2], &[0.0; 2], &mut robot, &mut [0.0; 3]);
-        assert_eq!(said, Err(ControlError::Sizes));
-    }
-
-    #[test]
-    fn impossible_designs_are_refused() {
-        let two = Vector2::repeat;
-        let build = |kp, ki, limit, period| {
-            FeedbackLinearizingPi::<f64, _>::new(&two(kp), &two(ki), &two(limit), period).err()
-        };
-        assert_eq!(
-            build(0.0, 1.0, 1.0, 0.01),
-            Some(DesignError::Proportional(0, 0.0))
-        );
-        assert_eq!(
-            build(1.0, -1.0, 1.0, 0.01),
-            Some(DesignError::Integral(0, -1.0))
-        );
-        assert_eq!(build(1.0, 1.0, 0.0, 0.01), Some(DesignError::Limit(0, 0.0)));
-        assert_eq!(build(1.0, 1.0, 1.0, 0.0), Some(DesignError::Period(0.0)));
-        assert_eq!(build(1.0, 0.0, f64::INFINITY, 0.01), None);
-    }
-}
+mod tests;

@@ -17,6 +17,7 @@ mod pi_response;
 mod pid;
 mod sampled_pi;
 mod solve;
+mod trajectory;
 
 #[cfg(feature = "std")]
 pub use feedback_linearizing_pi::FeedbackLinearizingPiSettings;
@@ -33,3 +34,6 @@ pub use pid::PidSettings;
 pub use pid::{Pid, PidGains};
 pub use sampled_pi::SampledPi;
 pub use solve::{Singular, solve};
+#[cfg(feature = "std")]
+pub use trajectory::TrajectorySettings;
+pub use trajectory::{Goal, Path, Trajectory};

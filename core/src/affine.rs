@@ -311,6 +311,10 @@ impl AffineModel<f64> for Affine {
         }
     }
 
+    fn ahead(&self) -> f64 {
+        self.predictor.as_ref().map_or(0.0, |p| p.commands_late())
+    }
+
     fn track(&mut self, seen: &Observation<'_, f64>, controlled: &mut [f64]) {
         self.use_learned();
         let measured = seen.measured;

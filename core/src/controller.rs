@@ -61,6 +61,11 @@ pub trait AffineModel<S: Real> {
     fn pass(&mut self, y: &[S], command: &mut [S]) {
         let _ = (y, command);
     }
+    /// Time from now until the plant feels a command that is written now, s: references that are known
+    /// before their time should be asked for that much earlier.
+    fn ahead(&self) -> S {
+        S::zero()
+    }
     /// Takes what happened since the tick before. `controlled` holds the controlled states as
     /// measured; it is replaced by the states that the next command will meet, where the model knows
     /// better.
@@ -87,6 +92,11 @@ pub trait Controller<S: Real>: Send {
         model: &mut dyn AffineModel<S>,
         command: &mut [S],
     ) -> Result<Command, ControlError>;
+    /// Replaces the loop's references by those of the last step, where the controller makes its own
+    /// (it follows a path): what was tracked, for logs and whoever watches over the loop.
+    fn demand(&self, reference: &mut [S]) {
+        let _ = reference;
+    }
     /// Forgets integrators and the last command.
     fn reset(&mut self);
 }
@@ -102,6 +112,9 @@ impl<S: Real, C: Controller<S> + ?Sized> Controller<S> for Box<C> {
         command: &mut [S],
     ) -> Result<Command, ControlError> {
         (**self).step(tick, reference, measured, model, command)
+    }
+    fn demand(&self, reference: &mut [S]) {
+        (**self).demand(reference);
     }
     fn reset(&mut self) {
         (**self).reset();

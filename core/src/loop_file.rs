@@ -11,10 +11,11 @@ use crate::limits::{self, LimitSettings};
 use crate::model::{Affine, Model, Treatment};
 use crate::registry::{
     BuildError, ControllerPart, DriverContext, DriverPart, EstimatorPart, HostDriver,
+    HostDriverError,
 };
 use crate::regression::Scheme;
 use crate::supervisor::{Supervisor, SupervisorSettings};
-use crate::{Clock, Controller, Loop, Signal, SimulatedClock, SystemClock};
+use crate::{AffineModel, Clock, Controller, Loop, Signal, SimulatedClock, SystemClock, TickError};
 
 /// A loop file, as written.
 #[derive(Debug, Serialize, Deserialize)]
@@ -80,8 +81,24 @@ pub struct Composed {
     pub controlled: Vec<&'static Signal>,
     /// One reference per controlled signal.
     pub references: Vec<Sequence>,
+    /// The references as they are now, and as the controller gets them.
+    now: Vec<f64>,
+    target: Vec<f64>,
     /// What the controller says of its design.
     pub notes: Vec<String>,
+}
+
+impl Composed {
+    /// One tick at `time`, s: with the references that hold then, and for the controller those that
+    /// hold when its command arrives, where the model knows how late that is.
+    pub fn tick(&mut self, time: f64) -> Result<crate::Step<'_, f64>, TickError<HostDriverError>> {
+        let ahead = self.host.model.ahead();
+        for (i, sequence) in self.references.iter().enumerate() {
+            self.now[i] = sequence.sample(time);
+            self.target[i] = sequence.sample(time + ahead);
+        }
+        self.host.tick_towards(&self.now, &self.target)
+    }
 }
 
 impl LoopFile {
@@ -229,9 +246,12 @@ impl LoopFile {
         )
         .supervised(supervisor);
         host.input_limits = input_limits;
+        host.target_limits = reference_limits.clone();
         host.reference_limits = reference_limits;
         Ok(Composed {
             host,
+            now: vec![0.0; controlled.len()],
+            target: vec![0.0; controlled.len()],
             controlled,
             references,
             notes,

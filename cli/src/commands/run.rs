@@ -202,7 +202,6 @@ fn drive(
         (d / file.period_s + 1e-9).floor().min(1e15) as u64
     });
     let bar = progress::bar("running", if ticks == u64::MAX { 0 } else { ticks });
-    let mut reference = vec![0.0; composed.references.len()];
     let mut end = End {
         text: format!(
             "the run lasted the {} s asked for",
@@ -216,10 +215,7 @@ fn drive(
             break;
         }
         let time = index as f64 * file.period_s;
-        for (value, sequence) in reference.iter_mut().zip(&composed.references) {
-            *value = sequence.sample(time);
-        }
-        match composed.host.tick(&reference) {
+        match composed.tick(time) {
             Ok(step) => {
                 recorder.push(time, &step);
                 if let Some(log) = log.as_mut() {

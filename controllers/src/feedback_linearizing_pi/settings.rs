@@ -31,6 +31,9 @@ pub struct FeedbackLinearizingPiSettings {
     /// How gains follow from the settling time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Rule>,
+    /// Feed the rate of the reference forward.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub feedforward: bool,
     /// Greatest magnitude of each input, in its unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<PerChannel>,
@@ -78,6 +81,11 @@ const META: PartMeta = PartMeta {
             "",
             "how gains follow from the settling time: `paper` (the default) by ω_n = 4/(ξ T_s), \
              which leaves the zero of H(s) out and settles later, or `exact`",
+        ),
+        Setting::new(
+            "feedforward",
+            "",
+            "adds the rate of the reference, for references without steps; default false",
         ),
         Setting::new(
             "limit",
@@ -212,7 +220,14 @@ impl ControllerPart for FeedbackLinearizingPiSettings {
                 &DVector::from_iterator(n, gains.iter().map(|g| g.1)),
                 &limit,
                 period,
-            ),
+            )
+            .map(|law| {
+                if self.feedforward {
+                    law.feeding_forward()
+                } else {
+                    law
+                }
+            }),
             Demand::Acceleration(acceleration) => {
                 let listed = PerChannel::Each(acceleration);
                 let acceleration = listed.expand("open_loop_acceleration", n)?;
@@ -293,10 +308,13 @@ impl ControllerPart for FeedbackLinearizingPiSettings {
                 .zip(gains)
                 .map(|(reference, (kp, ki))| {
                     let law = SampledPi::new(kp, ki, period)?;
-                    let (mut u, mut z) = (0.0, 0.0);
+                    let (mut u, mut z, mut before) = (0.0, 0.0, None);
                     let follow = |r: &f64| {
                         let (now, error) = (u, r - u);
                         u += period * (law.proportional * (law.reference_weight * r - u) + z);
+                        if self.feedforward {
+                            u += before.replace(*r).map_or(0.0, |before| r - before);
+                        }
                         z += law.integral * period * error;
                         now
                     };

@@ -6,6 +6,7 @@
 )]
 
 mod compensation;
+mod tracking;
 
 use loopsight_controllers as _;
 use loopsight_core::config::Source;
@@ -89,13 +90,10 @@ pub(crate) fn run(text: &str, model: &Model, robot: &Model, ticks: usize) -> Tra
     let mut trace = Trace::default();
     let period = composed.host.period();
     for k in 0..ticks {
-        let reference: Vec<f64> = (composed.references.iter())
-            .map(|sequence| sequence.sample(k as f64 * period))
-            .collect();
-        let step = composed.host.tick(&reference).unwrap();
+        let step = composed.tick(k as f64 * period).unwrap();
+        trace.reference.push(step.reference.to_vec());
         trace.measured.push(step.measured.to_vec());
         trace.applied.push(step.applied.to_vec());
-        trace.reference.push(reference);
     }
     trace
 }

@@ -61,6 +61,8 @@ pub(super) struct Predictor {
     /// Tick at which both began; `None` before the first measurement.
     start: Option<u64>,
     lateness: f64,
+    /// The part of it that is the commands'.
+    of_commands: f64,
     correction: f64,
     learning: f64,
 }
@@ -86,10 +88,18 @@ impl Affine {
     /// What the predictor does, in a plain statement.
     pub fn predictor_note(&self) -> Option<String> {
         let late = self.lateness()?;
-        Some(format!(
+        let commands = self.predictor.as_ref()?.of_commands;
+        let mut note = format!(
             "the controller acts on the state predicted {:.1} ms ahead",
             1e3 * late
-        ))
+        );
+        if commands > 0.0 {
+            note.push_str(&format!(
+                "; references are asked for {:.1} ms before their time",
+                1e3 * commands
+            ));
+        }
+        Some(note)
     }
 }
 
@@ -104,8 +114,11 @@ impl Predictor {
             treatments[i].is_predicted() && (meta.memory || meta.states > 0)
         };
         let only = whole.keeping(delays, measured);
-        let mut of_commands = only.clone();
-        of_commands.measured = exact(whole);
+        let of_input = |i: usize| {
+            let at = &whole.effects[i].at;
+            delays(i) && at.iter().all(|c| matches!(c.place, Place::Input(_)))
+        };
+        let of_commands = whole.keeping(of_input, exact(whole));
         let of_commands = lateness(whole, &of_commands, period);
         let lateness = lateness(whole, &only, period).max(0.5 * period);
         let omega = CALM / lateness.max(period);
@@ -122,6 +135,7 @@ impl Predictor {
             controlled: whole.plant.controlled,
             start: None,
             lateness,
+            of_commands,
             correction: -libm::expm1(-2.0 * omega * period),
             learning: omega * omega * period,
         }
@@ -130,6 +144,11 @@ impl Predictor {
     pub(super) fn set_values(&mut self, values: &[f64]) {
         self.late.set_values(values);
         self.prompt.set_values(values);
+    }
+
+    /// How much later than now a command is felt, s.
+    pub(super) fn commands_late(&self) -> f64 {
+        self.of_commands
     }
 
     /// The extended state `x₀`.
