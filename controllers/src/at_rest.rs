@@ -6,13 +6,17 @@ use loopsight_core::registry::BuildError;
 
 use crate::{Singular, solve};
 
+/// Chords that are tried, each twice as long as the one before, from the size of the state on.
+const CHORDS: u32 = 12;
+
 /// A model at rest, as a controller is designed from it.
 pub(crate) struct AtRest {
     /// Number of controlled states, and of inputs.
     pub(crate) n: usize,
     /// `G` at rest, row by row.
     pub(crate) matrix: Vec<f64>,
-    /// `-∂f_i/∂y_i`, 1/s: the chord over ± the size of the state, so that what has a sign counts little.
+    /// `-∂f_i/∂y_i`, 1/s, of what grows with the state: the least chord around rest, so that what only
+    /// has a sign (dry friction) does not pass for damping, which a controller would take away.
     pub(crate) damping: Vec<f64>,
     /// Sizes of the controlled states.
     pub(crate) sizes: Vec<f64>,
@@ -88,7 +92,10 @@ impl AtRest {
                 affine.evaluate(&state, &mut drift, &mut unused);
                 drift[i]
             };
-            (drift_at(-sizes[i]) - drift_at(sizes[i])) / (2.0 * sizes[i])
+            let mut chord = |y: f64| (drift_at(-y) - drift_at(y)) / (2.0 * y);
+            (0..CHORDS)
+                .map(|k| chord(sizes[i] * f64::from(1 << k)))
+                .fold(f64::INFINITY, f64::min)
         });
         Self {
             n,

@@ -6,6 +6,7 @@
 )]
 
 mod compensation;
+mod random;
 mod tracking;
 
 use loopsight_controllers as _;
