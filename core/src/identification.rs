@@ -132,7 +132,7 @@ impl Identification {
     }
 
     /// Plain statements, for reports: which of the parameters that a fit would estimate in `model` are
-    /// not learned here, and why.
+    /// not learned here, and why; which effects are not reckoned with.
     pub fn notes(&self, model: &Model) -> Vec<String> {
         let free = model.parameters.iter().enumerate().filter(|(_, p)| p.free);
         free.filter(|(j, _)| !self.learned.contains(j))
@@ -144,6 +144,12 @@ impl Identification {
                 };
                 format!("not learned: {}, because {why}", parameter.name)
             })
+            .chain(Regression::left_out(model).into_iter().map(|id| {
+                format!(
+                    "learned as if there were no {id}: it acts on a sensor, or has a state that \
+                     nothing measures"
+                )
+            }))
             .collect()
     }
 

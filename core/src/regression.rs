@@ -167,6 +167,13 @@ impl Regression {
         Ok(regression)
     }
 
+    /// Ids of the effects of `model` that [`Regression::with_effects`] cannot take in: what is learned is
+    /// the truer the less they do.
+    pub fn left_out(model: &Model) -> Vec<&'static str> {
+        let list = Acting::left_out(model).into_iter();
+        list.map(|index| model.effects[index].meta.id).collect()
+    }
+
     /// The values of all parameters at which the effects are taken from now on; ignored for another
     /// number of them.
     pub fn set_values(&mut self, values: &[f64]) {

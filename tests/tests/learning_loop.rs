@@ -225,6 +225,7 @@ fn friction_is_learned_behind_a_delay() {
         "{:?}",
         composed.notes
     );
+    assert!(!composed.notes.iter().any(|n| n.contains("as if")));
     drive(&mut composed, 3000, |_, _, _| {});
     let counted = measure(|| drive(&mut composed, 200, |_, _, _| {}));
     assert_eq!(counted.count_total, 0);
@@ -248,6 +249,22 @@ fn friction_is_learned_behind_a_delay() {
             values[j]
         );
     }
+}
+
+/// An effect that the regression cannot take in is named.
+#[test]
+fn what_is_not_reckoned_with_is_said() {
+    let lag = "\n[[effect]]\n[effect.sensor_lag]\nat = [\"sensor.linear_velocity\"]\nlag = 0.02\n";
+    let (_, composed) = composed(&format!("{}{lag}", plant(TWIL)), &plant(TWIL), DRIVEN);
+    let said = |what: &str| composed.notes.iter().any(|n| n.contains(what));
+    assert!(
+        said("learned as if there were no sensor_lag"),
+        "{:?}",
+        composed.notes
+    );
+    assert!(said(
+        "not learned: sensor_lag.lag, because it enters non-linearly"
+    ));
 }
 
 /// One sample in twenty is stale: they teach nothing, say so, and the rest is learned from.

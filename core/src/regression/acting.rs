@@ -69,6 +69,18 @@ impl Acting {
         lists.iter().any(|l| !l.is_empty()).then_some(acting)
     }
 
+    /// Effects of `model` (by index) of which nothing is followed here: those on sensors, and those on
+    /// efforts and rates that have states of their own.
+    pub(super) fn left_out(model: &Model) -> Vec<usize> {
+        let bounds = Bounds::of(model);
+        let sensed = bounds.outputs.iter().chain(&bounds.output_memory);
+        let slow = bounds.efforts.iter().chain(&bounds.bodies);
+        let slow = slow.filter(|b| b.n_z > 0 || b.history.is_some());
+        let mut list: Vec<usize> = sensed.chain(slow).map(|b| b.effect).collect();
+        list.dedup();
+        list
+    }
+
     /// Follows the inputs through a period (the nominal one where `span` is not known), and replaces
     /// them by what they come to.
     pub(super) fn follow(
