@@ -195,7 +195,7 @@ mod part {
             Setting::new(
                 "initial_covariance",
                 "1",
-                "the covariance starts as this multiple of the identity (parameter unit squared \
+                "the covariance starts as this multiple of the identity (scaled parameters squared \
                  over measurement unit squared); default 1e6",
             ),
             Setting::new(
