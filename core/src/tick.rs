@@ -145,6 +145,8 @@ pub struct Loop<S, D, C, M, O, K, B, W = ()> {
     pub input_limits: Option<Limits<B>>,
     period: f64,
     index: u64,
+    /// When the first tick began, by the clock.
+    origin: f64,
     reference: B,
     target: B,
     controlled: B,
@@ -177,6 +179,10 @@ pub struct Step<'a, S> {
     pub event: Option<Event<S>>,
     /// The controller has the last good model instead of the learned one.
     pub fallen: bool,
+    /// How long after its time the tick began, s.
+    pub late: f64,
+    /// How long it took from there until the command was written, s.
+    pub busy: f64,
 }
 
 /// When, how fresh the sample was, what the controller says, and what the supervisor did.
@@ -216,6 +222,7 @@ where
             input_limits: None,
             period,
             index: 0,
+            origin: 0.0,
             reference: controlled.clone(),
             target: controlled.clone(),
             controlled,
@@ -242,6 +249,7 @@ where
             input_limits: self.input_limits,
             period: self.period,
             index: self.index,
+            origin: self.origin,
             reference: self.reference,
             target: self.target,
             controlled: self.controlled,
@@ -286,9 +294,16 @@ where
         reference: &[S],
         target: &[S],
     ) -> Result<Step<'_, S>, TickError<D::Error, S>> {
-        self.clock.wait_until(self.index as f64 * self.period);
+        if self.index == 0 {
+            self.origin = self.clock.now();
+        }
+        let due = self.origin + self.index as f64 * self.period;
+        self.clock.wait_until(due);
+        let began = self.clock.now();
         match self.advance(reference, target) {
             Ok((tick, sample, outcome, event)) => Ok(Step {
+                late: began - due,
+                busy: self.clock.now() - began,
                 tick,
                 sample,
                 reference: self.reference.as_ref(),

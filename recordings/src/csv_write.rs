@@ -6,6 +6,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use loopsight_core::Signal;
 use loopsight_core::unit::parse;
@@ -22,11 +23,16 @@ use crate::error::RecordingError;
 /// assert_eq!(header(&Signal::new("duty", "d", "1", "Duty.")), "duty");
 /// ```
 pub fn header(signal: &Signal) -> String {
-    let unit = signal.unit.trim();
+    column(signal.id, signal.unit)
+}
+
+/// As [`header`], of anything that has a name and a unit.
+pub fn column(id: &str, unit: &str) -> String {
+    let unit = unit.trim();
     if matches!(unit, "" | "1") {
-        return signal.id.to_owned();
+        return id.to_owned();
     }
-    let mut text = format!("{}_", signal.id);
+    let mut text = format!("{id}_");
     for c in unit
         .strip_prefix("1/")
         .map_or(unit.into(), |rest| format!("/{rest}"))
@@ -43,11 +49,11 @@ pub fn header(signal: &Signal) -> String {
         }
     }
     // `V/m s` is V·s/m, but everything behind `per` divides: such a unit keeps its own spelling.
-    let ending = text.get(signal.id.len() + 1..).map(parse);
+    let ending = text.get(id.len() + 1..).map(parse);
     if ending == Some(parse(unit)) {
         text
     } else {
-        format!("{}_{unit}", signal.id)
+        format!("{id}_{unit}")
     }
 }
 
@@ -126,7 +132,8 @@ fn write_row(out: &mut impl Write, row: &[f64]) -> std::io::Result<()> {
     writeln!(out)
 }
 
-/// Log time between flushes, s: what a killed run loses at most.
+/// Time between flushes, s, by the log's time stamps and by the clock on the wall, whichever comes
+/// first: what a killed run loses at most.
 const FLUSH_PERIOD: f64 = 1.0;
 
 /// Writes a log while it is made.
@@ -141,7 +148,8 @@ pub struct LogWriter {
     out: BufWriter<File>,
     row: Vec<u8>,
     columns: usize,
-    flushed: Option<f64>,
+    /// Time stamp and instant of the last flush.
+    flushed: Option<(f64, Instant)>,
 }
 
 impl LogWriter {
@@ -190,16 +198,35 @@ impl LogWriter {
             .and_then(|()| self.out.write_all(&self.row))
             .map_err(|e| io(&self.part, "write", &e))?;
         let time = row.first().copied().unwrap_or(f64::NAN);
-        match self.flushed {
-            None => self.flushed = Some(time),
-            // Written so that a NaN or a clock set back flushes, too.
-            Some(last) if (0.0..FLUSH_PERIOD).contains(&(time - last)) => {}
-            Some(_) => {
-                self.flushed = Some(time);
-                self.out.flush().map_err(|e| io(&self.part, "write", &e))?;
+        let due = match self.flushed {
+            None => {
+                self.flushed = Some((time, Instant::now()));
+                return Ok(());
             }
-        }
-        Ok(())
+            // Written so that a NaN or a clock set back flushes, too.
+            Some((last, at)) => {
+                !(0.0..FLUSH_PERIOD).contains(&(time - last))
+                    || at.elapsed().as_secs_f64() >= FLUSH_PERIOD
+            }
+        };
+        if due { self.flush(time) } else { Ok(()) }
+    }
+
+    fn flush(&mut self, time: f64) -> Result<(), RecordingError> {
+        self.flushed = Some((time, Instant::now()));
+        self.out.flush().map_err(|e| io(&self.part, "write", &e))
+    }
+
+    /// Writes what happened at a time (s) as a comment between the rows, and all rows so far to the
+    /// disk: an event is what a killed run is asked for first.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::Io`].
+    pub fn remark(&mut self, time: f64, text: &str) -> Result<(), RecordingError> {
+        let text = text.replace(['\n', '\r'], " ");
+        writeln!(self.out, "# {time:.3} s: {text}").map_err(|e| io(&self.part, "write", &e))?;
+        self.flush(time)
     }
 
     /// Writes what is left and gives the file its name; returns it.
@@ -321,6 +348,22 @@ mod tests {
                 assert!(text.ends_with('\n'), "after row {k}");
             }
         }
+    }
+
+    #[test]
+    fn a_remark_is_on_the_disk_at_once_and_is_no_row() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.csv");
+        let mut log = LogWriter::create(&path, &names(&["time_s", "u_V"])).unwrap();
+        log.write(&[0.0, 1.0]).unwrap();
+        log.remark(0.0, "an actuator\nsaturates").unwrap();
+        let text = std::fs::read_to_string(log.part_path()).unwrap();
+        assert_eq!(text, "time_s,u_V\n0,1\n# 0.000 s: an actuator saturates\n");
+        log.write(&[0.1, 2.0]).unwrap();
+        let source::Source::Table(table) = crate::read(&log.finish().unwrap()).unwrap() else {
+            panic!("a table")
+        };
+        assert_eq!(table.runs[0].rows, [0.0, 1.0, 0.1, 2.0]);
     }
 
     #[test]

@@ -33,7 +33,7 @@ mod sysid;
 mod table;
 
 pub use csv_read::read_csv_from;
-pub use csv_write::{LogWriter, header, write_csv};
+pub use csv_write::{LogWriter, column, header, write_csv};
 pub use error::{Location, RecordingError};
 pub use fault::{Fault, FaultKind, Severity};
 pub use map::{MeasuredSignal, Recording, map};

@@ -216,6 +216,7 @@ pub(crate) fn loop_record(n: usize) -> LoopRecord {
         ],
         notes: vec!["Settling time asked for 0.45 s, reached 0.607 s.".into()],
         end: "the reference ended".into(),
+        ..LoopRecord::default()
     }
 }
 

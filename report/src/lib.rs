@@ -43,6 +43,8 @@ pub use figure::{Figure, FigurePanel, FigureTrace, Style, figure_svg};
 pub use fit::fit_page;
 pub use improvement::improvement_page;
 pub use page::Context;
-pub use record::{ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace};
+pub use record::{
+    ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace, Timing,
+};
 pub use run::run_page;
 pub use save::{ReportError, save};

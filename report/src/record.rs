@@ -5,6 +5,10 @@
 pub struct LoopRecord {
     /// Period of the loop, s.
     pub period_s: f64,
+    /// Ticks that were run; 0: as many as are kept.
+    pub ticks: usize,
+    /// One in so many ticks is kept; 0 and 1: all are.
+    pub every: usize,
     /// Time of each tick since the start, s.
     pub time: Vec<f64>,
     /// The signals under control.
@@ -13,16 +17,80 @@ pub struct LoopRecord {
     pub inputs: Vec<InputTrace>,
     /// Ticks at which the controller wanted more than it could get.
     pub saturated: Vec<bool>,
+    /// Ticks whose measurement was older than the tick; empty: none.
+    pub stale: Vec<bool>,
+    /// Ticks at which the controller had the last good model instead of the learned one; empty:
+    /// none.
+    pub fallen: Vec<bool>,
     /// Estimated parameters; empty without an estimator.
     pub parameters: Vec<ParameterTrace>,
     /// Innovations of the estimator; empty without one.
     pub innovations: Vec<InnovationTrace>,
+    /// How much the least excited direction of each regression was excited; empty without an
+    /// estimator.
+    pub excitations: Vec<InnovationTrace>,
+    /// How well real time was kept; `None` where time was simulated.
+    pub timing: Option<Timing>,
     /// What happened when (s): resets, faults, lost samples.
     pub events: Vec<(f64, String)>,
     /// Sentences worth reading, e.g. the settling time asked for and the one reached.
     pub notes: Vec<String>,
     /// Why the loop ended, in words; empty: not known.
     pub end: String,
+}
+
+/// How well a loop kept to the clock on the wall.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Timing {
+    /// Root mean square of the differences between periods and the period asked for, s.
+    pub jitter_s: f64,
+    /// Longest time after its time at which a tick began, s.
+    pub latest_s: f64,
+    /// Ticks that began more than a period late.
+    pub missed: usize,
+    /// Longest time from the beginning of a tick until its command was written, s.
+    pub longest_s: f64,
+}
+
+impl LoopRecord {
+    /// Ticks that were run.
+    pub fn ticks(&self) -> usize {
+        self.ticks.max(self.time.len())
+    }
+
+    /// Leaves out every second tick that is kept.
+    pub fn halve(&mut self) {
+        halve(&mut self.time);
+        for trace in &mut self.controlled {
+            halve(&mut trace.reference);
+            halve(&mut trace.measured);
+            trace.ideal.iter_mut().for_each(halve);
+        }
+        for trace in &mut self.inputs {
+            halve(&mut trace.commanded);
+            halve(&mut trace.applied);
+        }
+        for flags in [&mut self.saturated, &mut self.stale, &mut self.fallen] {
+            halve(flags);
+        }
+        for trace in &mut self.parameters {
+            halve(&mut trace.values);
+            trace.std.iter_mut().for_each(halve);
+        }
+        for trace in self.innovations.iter_mut().chain(&mut self.excitations) {
+            halve(&mut trace.values);
+        }
+        self.every = 2 * self.every.max(1);
+    }
+}
+
+/// Keeps the elements with even indices.
+fn halve<T>(values: &mut Vec<T>) {
+    let mut index = 0;
+    values.retain(|_| {
+        index += 1;
+        index % 2 == 1
+    });
 }
 
 /// A signal under control.
@@ -75,4 +143,30 @@ pub struct InnovationTrace {
     pub unit: String,
     /// Measurement less prediction.
     pub values: Vec<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::fixtures::loop_record;
+
+    #[test]
+    fn half_a_record_has_every_second_tick() {
+        let whole = loop_record(1001);
+        let mut half = whole.clone();
+        half.halve();
+        assert_eq!((half.every, half.time.len()), (2, 501));
+        let every = |values: &[f64]| values.iter().step_by(2).copied().collect::<Vec<f64>>();
+        assert_eq!(half.time, every(&whole.time));
+        assert_eq!(
+            half.controlled[1].measured,
+            every(&whole.controlled[1].measured)
+        );
+        assert_eq!(half.inputs[0].applied, every(&whole.inputs[0].applied));
+        assert_eq!(
+            half.parameters[0].values,
+            every(&whole.parameters[0].values)
+        );
+        half.halve();
+        assert_eq!((half.every, half.time.len()), (4, 251));
+    }
 }

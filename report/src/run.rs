@@ -5,7 +5,7 @@ use crate::errors::rms;
 use crate::html::{escape, identifier, list, table};
 use crate::numbers::{axis, percent, plain, quantity, show};
 use crate::page::{Context, page, section};
-use crate::record::LoopRecord;
+use crate::record::{LoopRecord, Timing};
 
 /// Lines for events; more would hide the traces.
 const MOST_EVENTS: usize = 60;
@@ -26,19 +26,31 @@ pub fn run_page(context: &Context, record: &LoopRecord) -> String {
     if !record.parameters.is_empty() || !record.innovations.is_empty() {
         body.push_str(&section(
             "What the estimator learned",
-            &format!(
-                "Parameters{}; below them the innovation: what each measurement told that was not \
-                 expected. Wild first guesses may be out of sight: double-click to see all.",
-                if record.parameters.iter().any(|p| p.std.is_some()) {
-                    " with a band of ± 2 standard deviations"
-                } else {
-                    ""
-                }
-            ),
+            &learned(record),
             &estimator(record).html(),
         ));
     }
     page(context, &body)
+}
+
+/// What stands above the estimator's charts.
+fn learned(record: &LoopRecord) -> String {
+    let mut text = "Parameters".to_owned();
+    if record.parameters.iter().any(|p| p.std.is_some()) {
+        text.push_str(" with a band of ± 2 standard deviations");
+    }
+    if record.fallen.contains(&true) {
+        text.push_str(" (shaded: the controller had the last good model instead)");
+    }
+    text.push_str("; below them the innovation: what each measurement told that was not expected");
+    if !record.excitations.is_empty() {
+        text.push_str(
+            ", and the excitation of the direction that is excited least: near zero nothing can \
+             be learned along it",
+        );
+    }
+    text.push_str(". Wild first guesses may be out of sight: double-click to see all.");
+    text
 }
 
 fn sentence(record: &LoopRecord) -> String {
@@ -46,22 +58,55 @@ fn sentence(record: &LoopRecord) -> String {
     if n == 0 {
         return with_end("The loop did not complete a single tick.".into(), record);
     }
-    // The last tick, too, lasts a period.
-    let duration = record.time[n - 1] - record.time[0] + record.period_s;
+    let ticks = record.ticks();
     let mut text = format!(
-        "The loop ran for {} in {n} ticks of {}.",
-        quantity(&plain(duration), "s"),
+        "The loop ran for {} in {ticks} ticks of {}.",
+        quantity(&plain(ticks as f64 * record.period_s), "s"),
         quantity(&plain(1000.0 * record.period_s), "ms"),
     );
-    let saturated = record.saturated.iter().take(n).filter(|s| **s).count();
-    text.push_str(&match saturated {
-        0 => " The inputs never saturated.".to_owned(),
-        _ => format!(
-            " The inputs were saturated {} of the time.",
-            percent(saturated as f64 / n as f64)
-        ),
+    let share = |flags: &[bool]| {
+        let set = flags.iter().take(n).filter(|s| **s).count();
+        (set > 0).then(|| percent(set as f64 / n as f64))
+    };
+    text.push_str(&match share(&record.saturated) {
+        None => " The inputs never saturated.".to_owned(),
+        Some(share) => format!(" The inputs were saturated {share} of the time."),
     });
+    if let Some(share) = share(&record.stale) {
+        text.push_str(&format!(" {share} of the samples were stale."));
+    }
+    if let Some(share) = share(&record.fallen) {
+        text.push_str(&format!(
+            " The last good model took the place of the learned one {share} of the time."
+        ));
+    }
+    if record.every > 1 {
+        text.push_str(&format!(
+            " It was long: one in {} ticks is kept here, all of them in the log.",
+            record.every
+        ));
+    }
+    if let Some(timing) = &record.timing {
+        text.push_str(&kept_time(timing, record.period_s, ticks));
+    }
     with_end(text, record)
+}
+
+/// How well real time was kept.
+fn kept_time(timing: &Timing, period_s: f64, ticks: usize) -> String {
+    let ms = |seconds: f64| quantity(&show(1000.0 * seconds, 3), "ms");
+    let missed = match timing.missed {
+        0 => "none began more than a period late".to_owned(),
+        missed => format!("{missed} of {ticks} began more than a period late"),
+    };
+    format!(
+        " Real time: the periods differed from {} by {} (rms), the latest tick began {} late, {missed}; \
+         the longest took {}.",
+        ms(period_s),
+        ms(timing.jitter_s),
+        ms(timing.latest_s),
+        ms(timing.longest_s),
+    )
 }
 
 fn with_end(text: String, record: &LoopRecord) -> String {
@@ -93,7 +138,14 @@ fn scores(record: &LoopRecord) -> String {
                     &c.unit,
                 ))
             };
-            let mut row = vec![identifier(&c.id), error(&c.reference)];
+            let largest = difference(&c.reference, &c.measured);
+            let largest = largest.iter().filter(|e| e.is_finite());
+            let largest = largest.fold(0.0_f64, |most, e| most.max(e.abs()));
+            let mut row = vec![
+                identifier(&c.id),
+                error(&c.reference),
+                escape(&quantity(&show(largest, 3), &c.unit)),
+            ];
             if ideal {
                 row.push(c.ideal.as_deref().map_or_else(|| "–".into(), error));
             }
@@ -103,11 +155,12 @@ fn scores(record: &LoopRecord) -> String {
     let header = [
         "signal",
         "from the reference (rms)",
+        "largest",
         "from the ideal response (rms)",
     ];
     table(
-        &header[..if ideal { 3 } else { 2 }],
-        &[false, true, true],
+        &header[..if ideal { 4 } else { 3 }],
+        &[false, true, true, true],
         &rows,
     )
 }
@@ -166,6 +219,7 @@ fn estimator(record: &LoopRecord) -> Chart {
             .as_ref()
             .map(|std| std.iter().map(|s| 2.0 * s).collect());
         chart.band("estimate", Role::Model, &p.values, two_sigma.as_deref());
+        chart.shade(&record.fallen);
         chart.settle();
     }
     for i in &record.innovations {
@@ -173,6 +227,11 @@ fn estimator(record: &LoopRecord) -> Chart {
         chart.panel_of(&i.id, title, 110);
         chart.line("innovation", Role::Residual, &i.values);
         chart.settle();
+    }
+    for e in &record.excitations {
+        let title = axis(&format!("excitation of {}", e.id), &e.unit);
+        chart.panel_of(&e.id, title, 110);
+        chart.line("excitation", Role::Series, &e.values);
     }
     chart.events = record
         .events
@@ -229,6 +288,34 @@ mod tests {
             "innovation of linear_velocity, m/s²",
             "estimator reset: covariance lost",
             "\"events\":[3.2,7.7]",
+        ] {
+            assert!(page.contains(text), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_was_watched_over_is_said() {
+        let mut record = loop_record(1000);
+        record.stale = (0..1000).map(|k| k % 20 == 0).collect();
+        record.fallen = (0..1000).map(|k| k >= 900).collect();
+        record.excitations = record.innovations.clone();
+        record.ticks = 4000;
+        record.every = 4;
+        record.timing = Some(Timing {
+            jitter_s: 123e-6,
+            latest_s: 0.0042,
+            missed: 3,
+            longest_s: 0.001,
+        });
+        let page = without_library(&run_page(&context(), &record));
+        for text in [
+            "The loop ran for 40\u{a0}s in 4000 ticks of 10\u{a0}ms.",
+            "% of the samples were stale",
+            "took the place of the learned one 10",
+            "one in 4 ticks is kept",
+            "by 0.123\u{a0}ms (rms), the latest tick began 4.2\u{a0}ms late, 3 of 4000 began",
+            "excitation of linear_velocity, m/s²",
+            "shaded: the controller had the last good model",
         ] {
             assert!(page.contains(text), "{text}");
         }
