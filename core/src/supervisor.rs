@@ -9,7 +9,7 @@ mod watch;
 
 use crate::{AffineModel, Observation, Observer, Real};
 #[cfg(feature = "std")]
-pub use settings::{SupervisorSettings, described};
+pub use settings::{SupervisorSettings, described, turning};
 pub use watch::{Supervisor, Thresholds};
 
 /// What a supervisor did.
@@ -23,7 +23,8 @@ pub enum Action {
     Stopped,
 }
 
-/// Why a supervisor acted; indices are those of the loop's measured signals, or of regressions.
+/// Why a supervisor acted; indices are those of the loop's measured signals, of
+/// regressions, or of shafts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Cause {
@@ -33,7 +34,8 @@ pub enum Cause {
     Innovation(usize),
     /// A signal is too far from its reference; value and limit: in the signal's unit.
     Tracking(usize),
-    /// A signal does not move although it should; value and limit: s.
+    /// A shaft, or a signal with a sensor of its own, keeps its speed although it should not; value and
+    /// limit: s.
     Frozen(usize),
     /// A measured signal left its range; value: in its unit, limit: the end of the range.
     Range(usize),

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::{Action, Cause, Event, Supervisor, Thresholds};
 use crate::config::nearest;
 use crate::model::Model;
 use crate::registry::BuildError;
+use crate::sensor::Sensor;
 
 /// When a supervisor acts, see [`Supervisor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -124,12 +126,49 @@ impl SupervisorSettings {
                 falls: self.falls,
             },
             model.values(),
-            rows,
+            (rows, controlled.len()),
             tracking.map(|limit| limit.unwrap_or(free)).collect(),
             (range(0, -free), range(1, free)),
+            shafts(model).1,
             |length| vec![0.0; length],
         ))
     }
+}
+
+/// What turns, by name, and the matrix that gives its speeds from the controlled signals, row by row:
+/// the shafts of the encoders where all controlled signals come from such, else the signals themselves.
+fn shafts(model: &Model) -> (Vec<String>, Vec<f64>) {
+    let n = model.plant.controlled.len();
+    let measured = model.measured.iter().take(n);
+    let mut names: Vec<String> = Vec::new();
+    for m in measured.clone() {
+        if let Sensor::EncoderCounts(encoder) = &m.sensor {
+            for shaft in encoder
+                .of
+                .keys()
+                .filter(|id| !names.contains(id))
+                .cloned()
+                .collect::<Vec<_>>()
+            {
+                names.push(shaft);
+            }
+        }
+    }
+    let gain = |i: usize, shaft: &str| match &model.measured[i].sensor {
+        Sensor::EncoderCounts(encoder) => encoder.of.get(shaft).copied().unwrap_or(0.0),
+        _ => 0.0,
+    };
+    let gains = DMatrix::from_fn(n, names.len(), |i, k| gain(i, &names[k]));
+    if let (true, Some(inverse)) = (names.len() == n, gains.try_inverse()) {
+        return (names, inverse.transpose().as_slice().to_vec());
+    }
+    let names = measured.map(|m| m.signal.id.to_owned()).collect();
+    (names, DMatrix::<f64>::identity(n, n).as_slice().to_vec())
+}
+
+/// Names of what a supervised loop may find frozen, for [`described`].
+pub fn turning(model: &Model) -> Vec<String> {
+    shafts(model).0
 }
 
 /// Every key of `given` is one of `ids`.
@@ -153,8 +192,9 @@ fn named<T>(
     })
 }
 
-/// An event in words; `signals` are the loop's measured signals by id and unit.
-pub fn described(event: &Event<f64>, signals: &[(&str, &str)]) -> String {
+/// An event in words; `signals` are the loop's measured signals by id and unit, `turning` what
+/// [`turning`] says.
+pub fn described(event: &Event<f64>, signals: &[(&str, &str)], turning: &[String]) -> String {
     let (value, limit) = (event.value, event.limit);
     let id = |i: usize| signals.get(i).map_or("a signal", |s| s.0);
     let unit = |i: usize| signals.get(i).map_or("", |s| s.1);
@@ -174,8 +214,8 @@ pub fn described(event: &Event<f64>, signals: &[(&str, &str)]) -> String {
             unit(i)
         ),
         Cause::Frozen(i) => format!(
-            "{} has not moved for {value:.2} s although it should (limit {limit} s)",
-            id(i)
+            "{} has kept its speed for {value:.2} s although it should not: its sensor is dead, or it is blocked (limit {limit} s)",
+            turning.get(i).map_or("a shaft", String::as_str)
         ),
         Cause::Range(i) => format!(
             "{} is {value:.4} {} (limit {limit} {})",

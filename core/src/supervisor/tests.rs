@@ -82,9 +82,11 @@ impl Bench {
             supervisor: Supervisor::new(
                 THRESHOLDS,
                 [7.0, 2.0],
-                1,
+                (1, 2),
                 [free; 2],
                 ([-9.0, -free], [9.0, free]),
+                // The second shaft turns with the difference of the signals.
+                [1.0, 0.0],
                 |_| [0.0; 2],
             ),
             observer: Script::default(),
@@ -300,7 +302,7 @@ fn events_are_said_in_words() {
         limit: 0.5,
     };
     assert_eq!(
-        described(&event, &[("speed", "m/s")]),
+        described(&event, &[("speed", "m/s")], &[]),
         "stopped by the supervisor: speed is 0.700 m/s off its reference (limit 0.500 m/s)"
     );
 }

@@ -7,8 +7,11 @@ use crate::{AffineModel, Observation, Observer, Real};
 /// A relapse counts for this long, s.
 const REMEMBERED: f64 = 60.0;
 
-/// Change, relative to the signal and its reference, below which a signal keeps its value.
+/// Change, relative to the largest speed asked for, below which a shaft keeps its speed.
 const STILL: f64 = 1e-6;
+
+/// Share of the largest speed asked for below which a shaft may well stand.
+const MATTERS: f64 = 0.1;
 
 /// When a supervisor acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +28,7 @@ pub struct Thresholds<S> {
     pub tracking_share: S,
     /// How long a tracking error may be beyond its limit, s.
     pub tracking_for: S,
-    /// How long a signal that should move may keep one value, s.
+    /// How long a shaft that should turn otherwise may keep its speed, s.
     pub frozen: S,
     /// How long there may be no fresh sample, s.
     pub stale: S,
@@ -68,14 +71,19 @@ pub struct Thresholds<S> {
 pub struct Supervisor<S, B> {
     thresholds: Thresholds<S>,
     models: Models<S, B>,
+    controlled: usize,
     /// Largest tracking error by controlled signal; infinite: the share of the reference.
     tracking: B,
     low: B,
     high: B,
     largest_reference: B,
     off_for: B,
+    /// Speed of each shaft from the controlled signals, row by row.
+    shafts: B,
+    /// By shaft: how long it has kept its speed, that speed, and the largest one asked for so far.
     frozen_for: B,
     last: B,
+    largest_speed: B,
     reference: B,
     stale_for: S,
     unusual_for: S,
@@ -89,25 +97,33 @@ pub struct Supervisor<S, B> {
 }
 
 impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
-    /// A supervisor for a model with parameters `values` and `rows` regressions. `tracking` has a
+    /// A supervisor for a model with parameters `values`, `rows` regressions and so many controlled
+    /// signals. `tracking` has a
     /// limit per controlled signal, `range` the least and greatest values of the measured ones
-    /// (infinite: none). Buffers of a given length or longer come from `zeros`.
+    /// (infinite: none). `shafts` turns the controlled signals into the speeds of the shafts whose
+    /// encoders they come from, row by row; the identity where each signal has a sensor of its own.
+    /// Buffers of a given length or longer come from `zeros`.
     pub fn new(
         thresholds: Thresholds<S>,
         values: B,
-        rows: usize,
+        (rows, controlled): (usize, usize),
         tracking: B,
         range: (B, B),
+        shafts: B,
         zeros: impl Fn(usize) -> B,
     ) -> Self {
-        let n = tracking.as_ref().len();
+        let n = controlled.max(1);
+        let turning = shafts.as_ref().len() / n;
         Self {
             thresholds,
+            controlled: n,
             models: Models::new(values, rows, &zeros),
             largest_reference: zeros(n),
             off_for: zeros(n),
-            frozen_for: zeros(n),
-            last: zeros(n),
+            frozen_for: zeros(turning),
+            last: zeros(turning),
+            largest_speed: zeros(turning),
+            shafts,
             reference: zeros(n),
             tracking,
             low: range.0,
@@ -139,13 +155,24 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
                 return Some(stopped(Cause::Range(i), *y, limit));
             }
         }
-        for i in 0..self.last.as_ref().len() {
-            let (Some(y), Some(r)) = (seen.measured.get(i), self.reference.as_ref().get(i)) else {
-                continue;
+        self.frozen(seen.measured, period)
+    }
+
+    /// A shaft that keeps its speed, far from the one asked for.
+    fn frozen(&mut self, measured: &[S], period: S) -> Option<Event<S>> {
+        let rows = self.shafts.as_ref().chunks_exact(self.controlled);
+        for (i, row) in rows.enumerate() {
+            let speed = |of: &[S]| {
+                let pairs = row.iter().zip(of);
+                pairs.fold(S::zero(), |sum, (gain, value)| sum + *gain * *value)
             };
-            let stands = (*y - self.last.as_ref()[i]).abs() <= (y.abs() + r.abs()) * S::of(STILL);
-            let should = (*r - *y).abs() > r.abs() * S::of(0.5);
-            self.last.as_mut()[i] = *y;
+            let (is, wanted) = (speed(measured), speed(self.reference.as_ref()));
+            let largest = &mut self.largest_speed.as_mut()[i];
+            *largest = largest.larger(wanted.abs());
+            let last = core::mem::replace(&mut self.last.as_mut()[i], is);
+            let stands = (is - last).abs() <= *largest * S::of(STILL);
+            let matters = wanted.abs() > *largest * S::of(MATTERS);
+            let should = matters && (wanted - is).abs() > wanted.abs() * S::of(0.5);
             let clock = &mut self.frozen_for.as_mut()[i];
             *clock = if stands && should {
                 *clock + period

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use loopsight_core::loop_file::Composed;
 use loopsight_core::model::Model;
-use loopsight_core::supervisor::{Event, described};
+use loopsight_core::supervisor::{Event, described, turning};
 use loopsight_core::{Signal, Step};
 use loopsight_recordings::{column, header};
 use loopsight_report::{ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace};
@@ -62,6 +62,7 @@ pub(super) struct Recorder {
     pub(super) fallen: usize,
     row: Vec<f64>,
     signals: Vec<Signal>,
+    turning: Vec<String>,
     stopwatch: Option<Stopwatch>,
     was: [bool; 2],
     alike: [usize; 2],
@@ -142,6 +143,7 @@ impl Recorder {
             stale: 0,
             fallen: 0,
             row: Vec::new(),
+            turning: turning(model),
             signals: model.measured.iter().map(|m| *m.signal).collect(),
             stopwatch: real_time.then(Stopwatch::default),
             was: [false; 2],
@@ -294,7 +296,7 @@ impl Recorder {
     /// What a supervisor did, in words.
     pub(super) fn words(&self, event: &Event<f64>) -> String {
         let signals = self.signals.iter().map(|s| (s.id, s.unit));
-        described(event, &signals.collect::<Vec<_>>())
+        described(event, &signals.collect::<Vec<_>>(), &self.turning)
     }
 
     pub(super) fn happened(&mut self, time: f64, text: String) {

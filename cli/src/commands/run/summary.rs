@@ -10,7 +10,7 @@ use super::recorder::{Recorder, Sums};
 use crate::output;
 
 /// Events that are told at the end; the page has more, the log all.
-const MOST_TOLD: usize = 12;
+const MOST_TOLD: usize = 20;
 
 /// What `--json` says of a run.
 #[derive(Serialize)]
@@ -262,17 +262,7 @@ impl Summary {
             }
         }
         if !self.events.is_empty() {
-            text.push_str("\n\nevents");
-            for event in self.events.iter().take(MOST_TOLD) {
-                text.push_str(&format!("\n  {:>9.3} s  {}", event.time_s, event.what));
-            }
-            if let Some(last) = self.events.get(MOST_TOLD..).and_then(<[_]>::last) {
-                let more = self.events.len() - MOST_TOLD;
-                text.push_str(&format!(
-                    "\n  and {more} more, the last at {:.3} s: {}",
-                    last.time_s, last.what
-                ));
-            }
+            text.push_str(&format!("\n\nevents\n{}", self.events_text()));
         }
         if !self.notes.is_empty() {
             text.push('\n');
@@ -281,6 +271,38 @@ impl Summary {
             text.push_str(&format!("\n{note}"));
         }
         text
+    }
+
+    /// A line for each thing that happened; what happened again and again is told once.
+    fn events_text(&self) -> String {
+        let mut told: Vec<(&Happened, usize, f64)> = Vec::new();
+        for event in &self.events {
+            match told
+                .iter_mut()
+                .find(|(first, _, _)| first.what == event.what)
+            {
+                Some((_, times, last)) => {
+                    *times += 1;
+                    *last = event.time_s;
+                }
+                None => told.push((event, 1, event.time_s)),
+            }
+        }
+        let mut lines: Vec<String> = told
+            .iter()
+            .take(MOST_TOLD)
+            .map(|(event, times, last)| {
+                let again = match times {
+                    1 => String::new(),
+                    _ => format!(" ({times} times, the last at {last:.3} s)"),
+                };
+                format!("  {:>9.3} s  {}{again}", event.time_s, event.what)
+            })
+            .collect();
+        if let Some(more) = told.len().checked_sub(MOST_TOLD).filter(|more| *more > 0) {
+            lines.push(format!("  and {more} more, see the log"));
+        }
+        lines.join("\n")
     }
 
     fn estimates_text(&self) -> String {
