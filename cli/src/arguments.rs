@@ -271,4 +271,7 @@ pub(crate) struct RunOptions {
     /// Write a page with pictures; opens offline in any browser.
     #[arg(long, value_name = "FILE")]
     pub(crate) html: Option<PathBuf>,
+    /// Write a picture (SVG) for a text.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
 }

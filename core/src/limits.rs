@@ -84,7 +84,8 @@ impl<B> Limits<B> {
     }
 }
 
-#[cfg(all(test, feature = "std"))]
+#[cfg(test)]
+#[cfg(feature = "std")]
 mod tests {
     use proptest::prelude::*;
 

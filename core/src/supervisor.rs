@@ -3,7 +3,8 @@
 mod models;
 #[cfg(feature = "std")]
 mod settings;
-#[cfg(all(test, feature = "std"))]
+#[cfg(test)]
+#[cfg(feature = "std")]
 mod tests;
 mod watch;
 

@@ -27,6 +27,7 @@ mod page;
 mod record;
 mod residual_force;
 mod run;
+mod run_figure;
 mod save;
 mod scatter;
 mod thin;
@@ -47,4 +48,5 @@ pub use record::{
     ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace, Timing,
 };
 pub use run::run_page;
+pub use run_figure::run_figure;
 pub use save::{ReportError, save};

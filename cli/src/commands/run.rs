@@ -16,7 +16,7 @@ use loopsight_core::loop_file::{Composed, LoopFile};
 use loopsight_core::model::Model;
 use loopsight_core::registry::{BuildError, DriverContext};
 use loopsight_recordings::{LogWriter, RecordingError};
-use loopsight_report::{Context, LoopRecord, run_page, save};
+use loopsight_report::{Context, LoopRecord, figure_svg, run_figure, run_page, save};
 use recorder::Recorder;
 use summary::Summary;
 
@@ -33,7 +33,7 @@ pub(crate) fn run(options: &RunOptions) -> Result<(), Failure> {
         .output
         .clone()
         .or_else(|| file.log.as_ref().map(|l| beside(&options.file, l)));
-    for path in log_path.iter().chain(&options.html) {
+    for path in log_path.iter().chain(&options.html).chain(&options.svg) {
         load::writable(path)?;
     }
     let real_time = file.real_time || !file.driver.is_simulated();
@@ -60,10 +60,14 @@ pub(crate) fn run(options: &RunOptions) -> Result<(), Failure> {
     if options.json {
         output::json(&summary)?;
     }
+    let title = file.name.clone().unwrap_or_else(|| model.name.clone());
+    let mut record = recorder.record;
+    record.notes.clone_from(&summary.notes);
+    if let Some(path) = &options.svg {
+        save(path, &figure_svg(&run_figure(&title, &record)))?;
+        output::note(&format!("wrote {}", path.display()));
+    }
     if let Some(path) = &options.html {
-        let mut record = recorder.record;
-        record.notes.clone_from(&summary.notes);
-        let title = file.name.clone().unwrap_or_else(|| model.name.clone());
         let context = Context {
             title,
             model_name: model.name.clone(),

@@ -251,7 +251,9 @@ impl Recorder {
             for row in 0..identification.len() {
                 let estimator = identification.estimator(row);
                 for (i, theta) in estimator.theta().iter().enumerate() {
-                    let deviation = estimator.deviation(i);
+                    // Before the first lesson nothing is known of the noise.
+                    let deviation = Some(estimator.deviation(i)).filter(|d| *d > 0.0);
+                    let deviation = deviation.unwrap_or(f64::NAN);
                     self.row.push(*theta);
                     self.estimates[next] = *theta;
                     self.deviations[next] = deviation;
