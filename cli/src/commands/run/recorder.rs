@@ -15,7 +15,7 @@ use crate::commands::simulate::rounded;
 /// Most ticks that are kept for the page; beyond it every second one is left out, again and again.
 const MOST_KEPT: usize = 200_000;
 
-/// Most events of one kind that are kept.
+/// Most events of one kind that are logged.
 const MOST_ALIKE: usize = 200;
 
 /// Sums over all ticks, also those that are not kept.
@@ -189,7 +189,12 @@ impl Recorder {
         for kind in 0..2 {
             if flags[kind] && !self.was[kind] && self.alike[kind] < MOST_ALIKE {
                 self.alike[kind] += 1;
-                self.happened(time, says[kind].to_owned());
+                // The page shades what comes again and again; the log has each time.
+                if self.alike[kind] == 1 {
+                    self.happened(time, format!("{} for the first time", says[kind]));
+                } else {
+                    self.fresh.push((time, says[kind].to_owned()));
+                }
             }
         }
         self.was = flags;
