@@ -33,9 +33,19 @@
         const dots = trace.role === "dots" || trace.role === "dots_after";
         const mean = dots || trace.role === "mean" || trace.role === "mean_after";
         if (trace.spread && !mean) {
-          const edge = sign => trace.y.map((y, k) => y === null || trace.spread[k] === null ? null : y + sign * trace.spread[k]);
-          const band = { ...common, mode: "lines", line: { width: 0 }, hoverinfo: "skip" };
-          out.push({ ...band, y: edge(-1) }, { ...band, y: edge(1), fill: "tonexty", fillcolor: theme.shade });
+          // A polygon for each stretch without a gap: filling towards the trace before closes across gaps.
+          const band = { ...common, x: [], y: [], mode: "lines", line: { width: 0 }, hoverinfo: "skip", fill: "toself", fillcolor: theme.shade };
+          const known = k => k < trace.y.length && trace.y[k] !== null && trace.spread[k] !== null;
+          for (let from = 0; from < trace.y.length; from += 1) {
+            if (!known(from)) continue;
+            let to = from;
+            while (known(to)) to += 1;
+            for (let k = from; k < to; k += 1) { band.x.push(x[k]); band.y.push(trace.y[k] - trace.spread[k]); }
+            for (let k = to - 1; k >= from; k -= 1) { band.x.push(x[k]); band.y.push(trace.y[k] + trace.spread[k]); }
+            band.x.push(null); band.y.push(null);
+            from = to;
+          }
+          out.push(band);
         }
         const drawn = { ...common, y: trace.y, name: escape(panel.of ? `${panel.of}, ${trace.name}` : trace.name), label: trace.name, color };
         if (trace.role === "points") {

@@ -313,7 +313,7 @@ mod tests {
             "% of the samples were stale",
             "took the place of the learned one 10",
             "one in 4 ticks is kept",
-            "by 0.123\u{a0}ms (rms), the latest tick began 4.2\u{a0}ms late, 3 of 4000 began",
+            "by 0.123\u{a0}ms (rms), the latest tick began 4.20\u{a0}ms late, 3 of 4000 began",
             "excitation of linear_velocity, m/s²",
             "shaded: the controller had the last good model",
         ] {

@@ -2,6 +2,10 @@
 
 use crate::figure::{Figure, FigurePanel, FigureTrace, Style};
 use crate::record::LoopRecord;
+use crate::thin::kept;
+
+/// Points of a line: a picture in a text is not zoomed into.
+const MOST_POINTS: usize = 1000;
 
 /// Lines of learned parameters in one panel; more could not be told apart.
 const MOST_LEARNED: usize = 4;
@@ -9,12 +13,16 @@ const MOST_LEARNED: usize = 4;
 /// A picture of a loop: each controlled signal with its reference, the inputs, and by how much the
 /// best known parameters have moved away from where they started.
 pub fn run_figure(title: &str, record: &LoopRecord) -> Figure {
-    let line = |name: &str, style: Style, values: &[f64], step: bool| FigureTrace {
-        name: name.to_owned(),
-        style,
-        time: record.time.iter().copied().take(values.len()).collect(),
-        values: values.to_vec(),
-        step,
+    let line = |name: &str, style: Style, values: &[f64], step: bool| {
+        let values = &values[..values.len().min(record.time.len())];
+        let drawn = kept(values, MOST_POINTS);
+        FigureTrace {
+            name: name.to_owned(),
+            style,
+            time: drawn.iter().map(|k| record.time[*k]).collect(),
+            values: drawn.iter().map(|k| values[*k]).collect(),
+            step,
+        }
     };
     let mut panels: Vec<FigurePanel> = record
         .controlled

@@ -368,18 +368,20 @@ fn controller() -> impl Strategy<Value = FeedbackLinearizingPiSettings> {
         channel(),
         rule,
         channel(),
-        option::of(vec(finite(), 0..3)),
+        (option::of(vec(finite(), 0..3)), any::<bool>()),
     )
         .prop_map(
-            |(proportional, integral, settling_time_s, damping, rule, limit, acceleration)| {
+            |(proportional, integral, settling_time_s, damping, rule, limit, more)| {
+                let (open_loop_acceleration, feedforward) = more;
                 FeedbackLinearizingPiSettings {
                     proportional,
                     integral,
                     settling_time_s,
                     damping,
                     rule,
+                    feedforward,
                     limit,
-                    open_loop_acceleration: acceleration,
+                    open_loop_acceleration,
                 }
             },
         )
