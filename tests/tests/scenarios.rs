@@ -146,7 +146,7 @@ fn a_doubled_mass_is_learned() {
     let found = payload.parameter("K_C");
     assert!((found / 0.068 - 1.0).abs() < 0.25, "K_C {found}");
     assert!(
-        payload.events("last good model").is_empty(),
+        payload.events("the last good model is back").is_empty(),
         "no reason to fall back"
     );
 }
