@@ -6,6 +6,7 @@
 )]
 
 mod compensation;
+mod example;
 mod random;
 mod tracking;
 
@@ -15,6 +16,7 @@ use loopsight_core::loop_file::{Composed, LoopFile};
 use loopsight_core::model::Model;
 use loopsight_core::registry::{BuildError, DriverContext};
 use loopsight_drivers as _;
+use loopsight_estimators as _;
 use loopsight_plants as _;
 
 /// The paper's robot, its velocities as they are.
