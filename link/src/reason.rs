@@ -1,0 +1,138 @@
+//! Why a robot stopped, or would not begin.
+
+use core::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Why a robot came to rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The host asked for it.
+    Asked,
+    /// No message to act upon came in time.
+    LinkLost,
+    /// The host greeted anew in the middle of a run.
+    HostRestarted,
+    /// A message of another session, or before any greeting: this robot was started anew.
+    OtherSession,
+    /// A step before a configuration.
+    NotConfigured,
+    /// Steps do not follow one another; what was expected and what came.
+    OutOfOrder {
+        /// Number of the tick that was expected.
+        expected: u32,
+        /// Number that came.
+        found: u32,
+    },
+    /// The measurements are too old for too long.
+    Stale,
+    /// A wheel is driven, and its encoder counts nothing; index of the signal.
+    EncoderLost(u8),
+    /// A measurement or a reference that is no number, or too few of them.
+    NotFinite,
+    /// The supply is below its least voltage.
+    SupplyLow,
+    /// The control law had no command.
+    NoCommand,
+    /// The host speaks another version.
+    Version {
+        /// Version of this robot.
+        expected: u16,
+        /// Version of the host.
+        found: u16,
+    },
+    /// The configuration cannot be used.
+    Configuration(Unusable),
+}
+
+/// What is wrong with a configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Unusable {
+    /// Another plant than the one this firmware was built for.
+    Plant,
+    /// Parameters that are not finite, too few or too many.
+    Parameters,
+    /// An effect this firmware does not know, by its position.
+    Effect(u8),
+    /// A channel on which this firmware compensates nothing, by the effect's position.
+    Channel(u8),
+    /// An effect that reads what this robot does not know (a pose, a supply, the time), by its position.
+    Reads(u8),
+    /// Settings of the learning.
+    Learning,
+    /// Gains or limits of the control law.
+    Controller,
+    /// Settings of the safety.
+    Safety,
+}
+
+impl Reason {
+    /// Identifier, for logs.
+    pub const fn id(self) -> &'static str {
+        match self {
+            Reason::Asked => "asked",
+            Reason::LinkLost => "link_lost",
+            Reason::HostRestarted => "host_restarted",
+            Reason::OtherSession => "other_session",
+            Reason::NotConfigured => "not_configured",
+            Reason::OutOfOrder { .. } => "out_of_order",
+            Reason::Stale => "stale",
+            Reason::EncoderLost(_) => "encoder_lost",
+            Reason::NotFinite => "not_finite",
+            Reason::SupplyLow => "supply_low",
+            Reason::NoCommand => "no_command",
+            Reason::Version { .. } => "version",
+            Reason::Configuration(_) => "configuration",
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Reason::Asked => f.write_str("the host asked for it"),
+            Reason::LinkLost => f.write_str("nothing to act upon came from the host in time"),
+            Reason::HostRestarted => f.write_str("the host was started anew"),
+            Reason::OtherSession => {
+                f.write_str("the message belongs to another session: the robot was started anew")
+            }
+            Reason::NotConfigured => f.write_str("a step came before any configuration"),
+            Reason::OutOfOrder { expected, found } => {
+                write!(f, "step {found} came where {expected} was expected")
+            }
+            Reason::Stale => f.write_str("the measurements have been too old for too long"),
+            Reason::EncoderLost(i) => write!(
+                f,
+                "the motors are driven and measured signal {i} does not move: is its encoder \
+                 connected?"
+            ),
+            Reason::NotFinite => f.write_str("a measurement or a reference is no number"),
+            Reason::SupplyLow => f.write_str("the supply is below its least voltage"),
+            Reason::NoCommand => f.write_str("the control law had no command"),
+            Reason::Version { expected, found } => write!(
+                f,
+                "the host speaks version {found} of the protocol, expected {expected}"
+            ),
+            Reason::Configuration(what) => write!(f, "the configuration cannot be used: {what}"),
+        }
+    }
+}
+
+impl fmt::Display for Unusable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Unusable::Plant => f.write_str("this firmware is for another plant"),
+            Unusable::Parameters => f.write_str("the values of the plant's parameters"),
+            Unusable::Effect(i) => write!(f, "effect {i} is not known to this firmware"),
+            Unusable::Channel(i) => {
+                write!(f, "effect {i} acts where this firmware compensates nothing")
+            }
+            Unusable::Reads(i) => write!(f, "effect {i} reads what this robot does not know"),
+            Unusable::Learning => f.write_str("the settings of the learning"),
+            Unusable::Controller => f.write_str("gains or limits of the control law"),
+            Unusable::Safety => f.write_str("the settings of the safety"),
+        }
+    }
+}
