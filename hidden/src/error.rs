@@ -24,6 +24,9 @@ pub enum HiddenError {
         /// Name of the machine.
         robot: &'static str,
     },
+    /// The machine can only be recorded as a whole.
+    #[error("the {0} is none of motors and wheels, and cannot be driven step by step")]
+    NotDriven(&'static str),
     /// The size makes no physical sense.
     #[error("`{effect}` of size {size}: expected a size above 0 and at most {largest}")]
     Size {

@@ -8,15 +8,12 @@ use loopsight_recordings::write_csv;
 use crate::driven::{Driven, ELECTRICAL_TIME_CONSTANT};
 use crate::error::HiddenError;
 use crate::experiment::{Experiment, PERIOD};
-use crate::hide::hide;
-use crate::machine::{Machine, STEP};
+use crate::live::Live;
+use crate::machine::STEP;
 use crate::machines::along_rig;
 use crate::motor::COPPER;
-use crate::odometry::Odometry;
-use crate::physics::Physics;
-use crate::random::Random;
 use crate::robot::Kind;
-use crate::truth::{Concealed, Quantity, Truth, significant};
+use crate::truth::{Quantity, Truth, significant};
 use crate::{Hidden, Robot};
 
 /// A log of a machine that hides something, and what it hides.
@@ -36,7 +33,7 @@ pub struct Recording {
 }
 
 /// Integration steps from sample to sample.
-const STEPS: usize = (PERIOD / STEP + 0.5) as usize;
+pub(crate) const STEPS: usize = (PERIOD / STEP + 0.5) as usize;
 
 /// Records 25 s of `robot` hiding `effects` (of the sizes given; none: the clean machine).
 ///
@@ -120,19 +117,13 @@ fn along_driven(
     winding_time_constant: f64,
 ) -> Result<Recording, HiddenError> {
     let samples = commands.len();
-    let mut physics = Physics::clean(driven);
-    // The windings' formulas have no zero to divide by below a nanosecond.
-    physics.motor.inductance = winding_time_constant.max(1e-9) * physics.motor.resistance;
-    let mut hidden = effects
-        .iter()
-        .map(|(effect, size)| hide(&mut physics, *effect, *size))
-        .collect::<Result<Vec<Concealed>, HiddenError>>()?;
-    let mut random = Random::new(seed, 1);
-    let phase = [random.uniform(), random.uniform()];
-    let mut odometry = Odometry::new(physics.odometry, phase, STEP);
-    let signals = physics.odometry.signals;
+    let Live {
+        mut machine,
+        mut odometry,
+        mut hidden,
+        signals,
+    } = Live::with_winding(driven, effects, seed, winding_time_constant)?;
     let drives = driven.drives();
-    let mut machine = Machine::new(physics);
 
     let mut run = Run {
         time: (0..samples).map(|k| k as f64 / 100.0).collect(),

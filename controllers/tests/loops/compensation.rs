@@ -17,10 +17,6 @@ linear_velocity = { steps = { at = [[0.5, 0.1], [3.0, -0.1], [5.5, 0.0]] } }
 angular_velocity = { steps = { at = [[1.5, 0.5], [4.0, -0.5], [6.5, 0.0]] } }
 ";
 
-fn effect(text: &str) -> String {
-    format!("[[effect]]\n{text}\n")
-}
-
 /// How far the `i`-th state of `trace` is from that of `other`, rms till `until`; what is measured
 /// is `gain` times what is.
 fn apart(trace: &Trace, other: &Trace, i: usize, gain: f64, until: usize) -> f64 {

@@ -9,6 +9,7 @@ mod compensation;
 mod example;
 mod random;
 mod tracking;
+mod truth;
 
 use loopsight_controllers as _;
 use loopsight_core::config::Source;
@@ -46,6 +47,11 @@ sensor = { encoder_counts = { counts_per_revolution = 8192.0, of = { shaft_angle
 
 pub(crate) fn model(text: &str) -> Model {
     Model::from_toml("model.toml", text).unwrap().0
+}
+
+/// An effect as it stands in a model file.
+pub(crate) fn effect(text: &str) -> String {
+    format!("[[effect]]\n{text}\n")
 }
 
 /// The loop `text` around `model`; the driver's `robot.toml` is `robot`.
