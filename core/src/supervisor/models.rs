@@ -34,6 +34,8 @@ pub(super) struct Models<S, B> {
     usual: B,
     last: B,
     age: S,
+    /// The last sample taught the observer something.
+    pub(super) taught_now: bool,
 }
 
 /// Takes what an observer teaches, and passes it on to a model if there is one.
@@ -85,6 +87,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
             usual: zeros(rows),
             last: zeros(rows),
             age: S::zero(),
+            taught_now: false,
         }
     }
 
@@ -122,6 +125,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
             }
         }
         self.age += seen.tick.period;
+        self.taught_now = false;
         // A plain mean until there is a long time to look back on.
         let slow = (share / S::of(USUAL)).larger(seen.tick.period / self.age);
         for row in 0..self.now.as_ref().len() {
@@ -135,6 +139,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
             let Some(innovation) = observer.innovation(row) else {
                 continue;
             };
+            self.taught_now |= innovation.accepted;
             let left = observer.residual(row, self.good.as_ref());
             let left = left.unwrap_or(innovation.innovation);
             let (e, g) = (innovation.innovation, left);

@@ -37,7 +37,7 @@ pub struct SupervisorSettings {
     pub frozen_s: f64,
     /// How long there may be no fresh sample, s.
     pub stale_s: f64,
-    /// How long the learned model must have been good before it is handed over, s.
+    /// How long the learned model must have been good, while it learned, before it is handed over, s.
     pub calm_s: f64,
     /// How often in a minute the learned model may be left before the loop stops.
     pub falls: u32,
@@ -135,22 +135,18 @@ impl SupervisorSettings {
     }
 }
 
-/// What turns, by name, and the matrix that gives its speeds from the controlled signals, row by row:
-/// the shafts of the encoders where all controlled signals come from such, else the signals themselves.
+/// What may freeze, by name, and the matrix that gives its speeds from the controlled signals, row by
+/// row: the shafts of the encoders where all controlled signals come from such, and the signals.
 fn shafts(model: &Model) -> (Vec<String>, Vec<f64>) {
     let n = model.plant.controlled.len();
     let measured = model.measured.iter().take(n);
     let mut names: Vec<String> = Vec::new();
     for m in measured.clone() {
         if let Sensor::EncoderCounts(encoder) = &m.sensor {
-            for shaft in encoder
-                .of
-                .keys()
-                .filter(|id| !names.contains(id))
-                .cloned()
-                .collect::<Vec<_>>()
-            {
-                names.push(shaft);
+            for shaft in encoder.of.keys() {
+                if !names.contains(shaft) {
+                    names.push(shaft.clone());
+                }
             }
         }
     }
@@ -159,11 +155,20 @@ fn shafts(model: &Model) -> (Vec<String>, Vec<f64>) {
         _ => 0.0,
     };
     let gains = DMatrix::from_fn(n, names.len(), |i, k| gain(i, &names[k]));
-    if let (true, Some(inverse)) = (names.len() == n, gains.try_inverse()) {
-        return (names, inverse.transpose().as_slice().to_vec());
+    let mut rows = Vec::new();
+    let inverse = if gains.is_square() {
+        gains.try_inverse()
+    } else {
+        None
+    };
+    match inverse {
+        // Column by column, the transpose is the inverse row by row.
+        Some(inverse) => rows.extend_from_slice(inverse.transpose().as_slice()),
+        None => names.clear(),
     }
-    let names = measured.map(|m| m.signal.id.to_owned()).collect();
-    (names, DMatrix::<f64>::identity(n, n).as_slice().to_vec())
+    names.extend(measured.map(|m| m.signal.id.to_owned()));
+    rows.extend_from_slice(DMatrix::<f64>::identity(n, n).as_slice());
+    (names, rows)
 }
 
 /// Names of what a supervised loop may find frozen, for [`described`].
@@ -225,7 +230,9 @@ pub fn described(event: &Event<f64>, signals: &[(&str, &str)], turning: &[String
         ),
         Cause::Stale => format!("no fresh sample for {value:.2} s (limit {limit} s)"),
         Cause::Relapse => format!("fell back {value:.0} times within a minute (limit {limit:.0})"),
-        Cause::Calm => format!("it predicted no worse than the last good model for {limit} s"),
+        Cause::Calm => {
+            format!("it predicted no worse than the last good model for {limit} s of learning")
+        }
     };
     match event.action {
         Action::FellBack => format!("the last good model is back: {why}"),

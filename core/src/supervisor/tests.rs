@@ -25,6 +25,8 @@ struct Script {
     innovation: f32,
     residual: f32,
     restarted: Option<f32>,
+    /// Learns nothing, as from a robot at rest.
+    idle: bool,
 }
 
 impl Observer<f32> for Script {
@@ -38,7 +40,7 @@ impl Observer<f32> for Script {
         (row == 0).then_some(Innovation {
             innovation: self.innovation,
             relative_variance: 1.0,
-            accepted: true,
+            accepted: !self.idle,
         })
     }
     fn residual(&self, row: usize, _: &[f32]) -> Option<f32> {
@@ -167,6 +169,12 @@ fn what_is_learned_has_to_prove_itself_first() {
         "nothing was left that had been in use"
     );
     assert_eq!(Bench::proved().model.0, 3.0);
+    // At rest all models predict alike: that proves nothing.
+    let mut idle = Bench::new();
+    idle.observer.theta = Some(3.0);
+    idle.observer.idle = true;
+    assert_eq!(idle.run(5.0), None);
+    assert_eq!(idle.model.0, 2.0);
 }
 
 #[test]
@@ -235,6 +243,19 @@ fn a_lost_track_costs_the_learned_model_first_and_then_the_run() {
     let mut plain = Bench::new();
     plain.error = 0.7;
     assert_eq!(plain.run(3.0).unwrap().1.action, Action::Stopped);
+    // A first guess that does not track is left for what predicts better.
+    let mut guess = Bench::new();
+    guess.observer.theta = Some(3.0);
+    guess.observer.idle = true;
+    guess.observer.innovation = 0.01;
+    guess.observer.residual = 0.05;
+    guess.error = 0.7;
+    let (_, event) = guess.run(3.0).unwrap();
+    assert_eq!(
+        (event.action, event.cause),
+        (Action::Resumed, Cause::Tracking(0))
+    );
+    assert_eq!(guess.model.0, 3.0);
     // Short of the limit, or not for long enough: nothing.
     let mut plain = Bench::new();
     plain.error = 0.4;

@@ -32,7 +32,7 @@ pub struct Thresholds<S> {
     pub frozen: S,
     /// How long there may be no fresh sample, s.
     pub stale: S,
-    /// How long the learned model must have been good before it is handed over, s.
+    /// How long the learned model must have been good, while it learned, before it is handed over, s.
     pub calm: S,
     /// How often in a minute the learned model may be left before the loop stops.
     pub falls: u32,
@@ -54,8 +54,9 @@ pub struct Thresholds<S> {
 /// | `r`, `y` | reference, measurement | of the signal |
 ///
 /// A learned model is handed to the controller only after it has predicted no worse than the model
-/// file for a while; from then on it becomes the good one whenever it has been no worse for as
-/// long. Where it predicts worse, or the loop does not track, the controller gets the last good
+/// file for a while in which it learned (at rest all models are alike); from then on it becomes the good one whenever it has been no worse for as
+/// long. A first guess that does not track is left for what predicts better at once. Where the learned
+/// model predicts worse, or the loop does not track, the controller gets the last good
 /// model back and the observer starts again from it. If that does not help, if no sample comes, if
 /// a signal freezes or leaves its range, or if no model explains what is measured, the loop stops.
 /// Two models whose innovations differ by less than a hundredth of the measured rates predict alike;
@@ -101,7 +102,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
     /// signals. `tracking` has a
     /// limit per controlled signal, `range` the least and greatest values of the measured ones
     /// (infinite: none). `shafts` turns the controlled signals into the speeds of the shafts whose
-    /// encoders they come from, row by row; the identity where each signal has a sensor of its own.
+    /// encoders they come from, row by row, and into themselves.
     /// Buffers of a given length or longer come from `zeros`.
     pub fn new(
         thresholds: Thresholds<S>,
@@ -250,7 +251,9 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
             self.calm_for = S::zero();
             return None;
         }
-        self.calm_for += period;
+        if self.models.taught_now {
+            self.calm_for += period;
+        }
         if self.calm_for < self.thresholds.calm || !self.models.adapts() {
             return None;
         }
@@ -260,11 +263,16 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
             value: self.calm_for,
             limit: self.thresholds.calm,
         };
+        self.hand_over().then_some(event)
+    }
+
+    /// The learned model becomes the good one, and is used; false where it was in use already.
+    fn hand_over(&mut self) -> bool {
         self.calm_for = S::zero();
+        self.off_for.as_mut().fill(S::zero());
         self.models.promote();
-        let was = core::mem::replace(&mut self.fallen, false);
         self.proved = true;
-        was.then_some(event)
+        core::mem::replace(&mut self.fallen, false)
     }
 }
 
@@ -312,7 +320,18 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervise<S> for Supervisor<S,
             return Some(self.fall_back(reason, observer, model));
         }
         if let Some((cause, value, limit)) = lost {
-            return Some(stopped(cause, value, limit));
+            // A first guess that does not even track has nothing to lose by what predicts better.
+            if self.proved || !self.models.adapts() || !self.models.learned_is_good() {
+                return Some(stopped(cause, value, limit));
+            }
+            self.hand_over();
+            self.models.take(observer, Some(model));
+            return Some(Event {
+                action: Action::Resumed,
+                cause,
+                value,
+                limit,
+            });
         }
         let event = self.trust(unusual.is_none(), period);
         let to = (!self.fallen).then_some(model);

@@ -177,7 +177,8 @@ fn short(value: f64) -> String {
     if !value.is_finite() {
         return "-".to_owned();
     }
-    let size = value.abs();
+    // Adding 0 makes -0 into 0.
+    let (value, size) = (value + 0.0, value.abs());
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
         return format!("{value:.1e}");
     }
@@ -220,6 +221,7 @@ mod tests {
     fn numbers_are_short() {
         for (value, text) in [
             (0.0, "0.0000"),
+            (-0.0, "0.0000"),
             (0.19834, "0.1983"),
             (-15.1464, "-15.15"),
             (1234.5, "1234"),
