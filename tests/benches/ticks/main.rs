@@ -204,6 +204,7 @@ fn settings() -> RlsSettings {
         forgetting: FORGETTING,
         initial_covariance: LIMIT,
         covariance_limit: None,
+        ..RlsSettings::default()
     }
 }
 

@@ -322,7 +322,13 @@ impl Summary {
                 ]
             })
             .collect();
-        let head = ["identified", "start", "value", "95 % interval", "unit"];
+        let head = [
+            "identified",
+            "start",
+            "value",
+            "95 % in white noise",
+            "unit",
+        ];
         output::table(&head, &rows)
     }
 }
