@@ -237,3 +237,105 @@ fn compensating_and_predicting_allocate_nothing() {
     assert_eq!(used.count_total, 0);
     assert!(worst < 0.01, "{worst}");
 }
+
+/// Every effect of the library, wherever it fits: what becomes of it is as it should be where that is
+/// known here, and a loop around a robot that has it runs.
+#[test]
+fn every_effect_of_the_library_can_stand_in_a_loop() {
+    let expected = |id: &str| match id {
+        "actuator_lag"
+        | "input_delay"
+        | "sensor_delay"
+        | "sensor_lag"
+        | "sensor_window"
+        | "sensor_offset"
+        | "sensor_scale"
+        | "wheel_radius_mismatch" => Some("predicted over"),
+        "backlash" | "wheel_slip" | "payload_change" | "torque_ripple" | "gravity_slope"
+        | "gravity_pendulum" | "linear_stiffness" | "cubic_stiffness" | "encoder_ripple" => {
+            Some("not compensated")
+        }
+        "coulomb_friction"
+        | "stribeck_friction"
+        | "directional_friction"
+        | "scrub_friction"
+        | "viscous_friction"
+        | "quadratic_drag"
+        | "constant_force"
+        | "dead_zone"
+        | "battery_sag"
+        | "gain_asymmetry"
+        | "input_offset"
+        | "input_saturation"
+        | "winding_heating"
+        | "centrifugal_offset" => Some("compensated"),
+        _ => None,
+    };
+    let axis = "[plant.dc_axis]\nK_A = -3.0\nK_C = 8.0\n[log.measured]\n\
+                speed = { sensor = \"instantaneous\" }\n";
+    let mut tried = 0;
+    for (plant, signal) in [
+        (
+            format!("{TWIL}{INSTANT}"),
+            "linear_velocity = { constant = 0.05 }",
+        ),
+        (axis.to_owned(), "speed = { constant = 2.0 }"),
+    ] {
+        let base = model(&plant);
+        for meta in loopsight_core::registry::effects() {
+            for channel in base.plant.channels {
+                let Some(mut robot) = base.with_effect(meta.id, &[channel.id]) else {
+                    continue;
+                };
+                // Neutral values would hide it.
+                for parameter in &mut robot.parameters {
+                    if parameter.value.is_none_or(|v| v == 0.0) {
+                        parameter.value = Some(parameter.scale().min(parameter.declaration.max));
+                    }
+                }
+                let said = robot.affine().unwrap().treatments()[0].say();
+                if let Some(start) = expected(meta.id) {
+                    assert!(said.starts_with(start), "{said}");
+                }
+                let loop_file = format!(
+                    "period_s = 0.01\nmodel = \"model.toml\"\n[driver.simulated]\nstep_s = 0.0025\nlimit = 12.0\n\
+                     [controller.feedback_linearizing_pi]\nsettling_time_s = 0.5\nlimit = 12.0\n[reference]\n{signal}\n"
+                );
+                let trace = run(&loop_file, &robot, &robot, 50);
+                assert!(
+                    trace.applied.iter().flatten().all(|u| u.is_finite()),
+                    "{said}"
+                );
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried > 100, "{tried}");
+}
+
+/// A position that is measured lifts the reason: gravity on an arm, a spring on an axis.
+#[test]
+fn a_measured_position_makes_it_compensable() {
+    const HELD: &str = "period_s = 0.01
+model = \"model.toml\"
+[driver.simulated]
+step_s = 0.001
+[controller.feedback_linearizing_pi]
+settling_time_s = 0.5
+[reference]
+speed = { sine = { amplitude = 2.0, frequency_hz = 0.4 } }
+";
+    let axis = |effects: &str, angle: &str| {
+        model(&format!(
+            "[plant.dc_axis]\nK_A = -3.0\nK_C = 8.0\n{effects}[log.measured]\n\
+             speed = {{ sensor = \"instantaneous\" }}\n{angle}"
+        ))
+    };
+    let pendulum = effect("[effect.gravity_pendulum]\nat = [\"shaft\"]\nsine = 1.5\ncosine = 0.5");
+    let angle = "angle = { sensor = \"instantaneous\" }\n";
+    let without = run(HELD, &axis("", angle), &axis("", angle), 1000);
+    let off = |robot: &Model| apart(&run(HELD, robot, robot, 1000), &without, 0, 1.0, 1000);
+    let (seen, unseen) = (off(&axis(&pendulum, angle)), off(&axis(&pendulum, "")));
+    println!("gravity: {seen:.5} rad/s with the angle, {unseen:.5} without");
+    assert!(seen < 0.05 * unseen);
+}

@@ -192,3 +192,16 @@ limit = 12.0
     println!("20 s after a start beside it {beside:.4} m");
     assert!(beside < 2.0 * after);
 }
+
+/// Samples that get lost are predicted over, where there is a predictor.
+#[test]
+fn lost_samples_are_predicted_over() {
+    let of = |fault: &str| {
+        let law = "[controller.feedback_linearizing_pi]\nsettling_time_s = 0.45\nlimit = 12.0";
+        let trace = drive(&format!("{fault}\n{law}"), &improved());
+        [0, 1].map(|i| trace.rms(i, 500))
+    };
+    let (whole, lossy) = (of(""), of("fault = [{ stale = { share = 0.05 } }]"));
+    println!("tracking {whole:.5?}, with one sample in twenty lost {lossy:.5?}");
+    assert!((0..2).all(|i| lossy[i] < 1.2 * whole[i]));
+}

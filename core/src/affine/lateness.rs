@@ -41,7 +41,8 @@ pub(super) fn lateness(whole: &Model, late: &Model, period: f64) -> f64 {
             }
         }
     }
-    worst
+    // Not minus zero.
+    worst + 0.0
 }
 
 /// The controlled states, measured as they are.
