@@ -191,6 +191,44 @@ fn spoilt_loops() {
             spoil("[driver.simulated]\nlimit = 12.0\n", ""),
             &["driver", "missing"],
         ),
+        (
+            format!("{LOOP}\n[supervisor]\ntracking = {{ linear_velocit = 0.1 }}\n"),
+            &["linear_velocit", "did you mean `linear_velocity`?"],
+        ),
+        (
+            format!("{LOOP}\n[supervisor]\nstale_s = 0.0\n"),
+            &["above 0 s", "spoilt.toml:"],
+        ),
+        (
+            format!("{LOOP}\n[supervisor]\nfrozen = 1.0\n"),
+            &["did you mean `frozen_s`?"],
+        ),
+        (
+            format!("{LOOP}\n[supervisor]\nrange = {{ linear_velocity = [1.0, -1.0] }}\n"),
+            &["lower end first", "spoilt.toml:"],
+        ),
+        (
+            format!("{LOOP}\n[limits]\nvoltage_rigth = {{ magnitude = 6.0 }}\n"),
+            &["voltage_rigth", "did you mean `voltage_right`?"],
+        ),
+        (
+            format!("{LOOP}\n[limits]\nvoltage_right = {{ magnitude = -6.0 }}\n"),
+            &["above 0", "spoilt.toml:"],
+        ),
+        (
+            spoil(
+                "limit = 12.0\n",
+                "limit = 12.0\nfault = [{ dead_encoder = { of = \"shaft_angle\" } }]\n",
+            ),
+            &["shaft_angle", "did you mean `shaft_angle_"],
+        ),
+        (
+            spoil(
+                "limit = 12.0\n",
+                "limit = 12.0\nfault = [{ stale = { share = 5.0 } }]\n",
+            ),
+            &["from 0 to 1", "spoilt.toml:"],
+        ),
     ] {
         desk.write("spoilt.toml", spoilt);
         desk.refused_saying(&["run", "spoilt.toml", "-o", "new.csv"], words);
