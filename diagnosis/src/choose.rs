@@ -9,6 +9,10 @@ use crate::trial::Judged;
 /// Share of what the best explanation leaves above the floor by which a smaller one may be worse.
 const BLUR: f64 = 0.3;
 
+/// An error so many times as large is not the same, whatever the statistics: where it lies in one
+/// transient, as after a payload was taken up, they have little to go by.
+const FAR: f64 = 1.5;
+
 /// The explanation that was put first.
 pub(crate) struct Chosen {
     /// Its index among the finalists.
@@ -31,7 +35,8 @@ pub(crate) fn choose(
     // No worse than another, by statistics or for all that can be done with it.
     let same = |i: usize, other: usize| {
         let (rank, other) = (&finalists[i].0.rank, &finalists[other].0.rank);
-        advantage(rank, other) < SAME || nrmse(rank) < CLOSE * nrmse(other)
+        let (error, least) = (nrmse(rank), nrmse(other));
+        error < CLOSE * least || error < FAR * least && advantage(rank, other) < SAME
     };
     let not_worse: Vec<usize> = (0..finalists.len())
         .filter(|i| same(*i, 0) || squared(*i) < allowed)
