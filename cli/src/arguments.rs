@@ -262,7 +262,8 @@ pub(crate) struct RunOptions {
     /// Loop file.
     #[arg(value_name = "LOOP")]
     pub(crate) file: PathBuf,
-    /// The log to write (CSV); by default what the loop file says.
+    /// The log to write, MCAP where its name ends in `.mcap`, else CSV; by default what the loop file
+    /// says.
     #[arg(short, long, value_name = "LOG")]
     pub(crate) output: Option<PathBuf>,
     /// JSON on standard output.

@@ -1,4 +1,4 @@
-//! CSV out: whole tables at once, and live logs row by row.
+//! Tables and logs out: whole tables at once as CSV, and live logs row by row, as CSV or MCAP.
 //!
 //! Numbers are written in the shortest form that reads back to the same bits; NaN, the missing
 //! value, as an empty field. Nobody ever sees half a file under the final name.
@@ -12,6 +12,7 @@ use loopsight_core::Signal;
 use loopsight_core::unit::parse;
 
 use crate::error::RecordingError;
+use crate::mcap_log::McapLog;
 
 /// The column of a signal: `linear_velocity` in `m/s` is `linear_velocity_m_per_s`.
 ///
@@ -141,34 +142,54 @@ const FLUSH_PERIOD: f64 = 1.0;
 /// Rows go to `NAME.part` beside the target (`NAME.2.part` and so on when an earlier run left
 /// its own there). [`LogWriter::finish`] gives the file its name; dropped before that, the part
 /// stays and can be read.
-#[derive(Debug)]
 pub struct LogWriter {
     target: PathBuf,
     part: PathBuf,
-    out: BufWriter<File>,
-    row: Vec<u8>,
+    out: Out,
     columns: usize,
     /// Time stamp and instant of the last flush.
     flushed: Option<(f64, Instant)>,
 }
 
+/// A log in its format.
+enum Out {
+    Csv {
+        out: BufWriter<File>,
+        /// The row that is written: in one piece, so that the buffer breaks between rows.
+        row: Vec<u8>,
+    },
+    Mcap(Box<McapLog>),
+}
+
 impl LogWriter {
-    /// Creates the part file and writes the header; the first column is the time in seconds.
+    /// Creates the part file and writes the header; the first column is the time in seconds. A name
+    /// that ends in `.mcap` makes an MCAP file, any other one CSV.
     ///
     /// # Errors
     ///
     /// [`RecordingError::Io`] when the file cannot be created.
     pub fn create(path: &Path, headers: &[String]) -> Result<Self, RecordingError> {
         let (part, file) = new_part(path)?;
-        let mut out = BufWriter::new(file);
-        write_header(&mut out, headers)
-            .and_then(|()| out.flush())
-            .map_err(|e| io(&part, "write", &e))?;
+        let out = if path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
+        {
+            McapLog::new(file, headers)
+                .map(|log| Out::Mcap(Box::new(log)))
+                .map_err(std::io::Error::other)
+        } else {
+            let mut out = BufWriter::new(file);
+            let written = write_header(&mut out, headers).and_then(|()| out.flush());
+            written.map(|()| Out::Csv {
+                out,
+                row: Vec::new(),
+            })
+        };
+        let out = out.map_err(|e| io(&part, "write", &e))?;
         Ok(Self {
             target: path.to_owned(),
             part,
             out,
-            row: Vec::new(),
             columns: headers.len(),
             flushed: None,
         })
@@ -192,11 +213,14 @@ impl LogWriter {
                 found: row.len(),
             });
         }
-        // In one piece, so that the buffer breaks between rows: a killed run leaves whole ones.
-        self.row.clear();
-        write_row(&mut self.row, row)
-            .and_then(|()| self.out.write_all(&self.row))
-            .map_err(|e| io(&self.part, "write", &e))?;
+        let written = match &mut self.out {
+            Out::Csv { out, row: text } => {
+                text.clear();
+                write_row(text, row).and_then(|()| out.write_all(text))
+            }
+            Out::Mcap(log) => log.row(row).map_err(std::io::Error::other),
+        };
+        written.map_err(|e| io(&self.part, "write", &e))?;
         let time = row.first().copied().unwrap_or(f64::NAN);
         let due = match self.flushed {
             None => {
@@ -214,10 +238,14 @@ impl LogWriter {
 
     fn flush(&mut self, time: f64) -> Result<(), RecordingError> {
         self.flushed = Some((time, Instant::now()));
-        self.out.flush().map_err(|e| io(&self.part, "write", &e))
+        let flushed = match &mut self.out {
+            Out::Csv { out, .. } => out.flush(),
+            Out::Mcap(log) => log.flush().map_err(std::io::Error::other),
+        };
+        flushed.map_err(|e| io(&self.part, "write", &e))
     }
 
-    /// Writes what happened at a time (s) as a comment between the rows, and all rows so far to the
+    /// Writes what happened at a time (s), in CSV as a comment between the rows, and all rows so far to the
     /// disk: an event is what a killed run is asked for first.
     ///
     /// # Errors
@@ -225,7 +253,11 @@ impl LogWriter {
     /// [`RecordingError::Io`].
     pub fn remark(&mut self, time: f64, text: &str) -> Result<(), RecordingError> {
         let text = text.replace(['\n', '\r'], " ");
-        writeln!(self.out, "# {time:.3} s: {text}").map_err(|e| io(&self.part, "write", &e))?;
+        let written = match &mut self.out {
+            Out::Csv { out, .. } => writeln!(out, "# {time:.3} s: {text}"),
+            Out::Mcap(log) => log.event(time, &text).map_err(std::io::Error::other),
+        };
+        written.map_err(|e| io(&self.part, "write", &e))?;
         self.flush(time)
     }
 
@@ -234,14 +266,20 @@ impl LogWriter {
     /// # Errors
     ///
     /// [`RecordingError::Io`]; the part file then remains.
-    pub fn finish(mut self) -> Result<PathBuf, RecordingError> {
-        self.out
-            .flush()
-            .and_then(|()| self.out.get_ref().sync_all())
-            .map_err(|e| io(&self.part, "write", &e))?;
-        std::fs::rename(&self.part, &self.target)
-            .map_err(|e| io(&self.target, "rename the finished log to", &e))?;
-        Ok(self.target.clone())
+    pub fn finish(self) -> Result<PathBuf, RecordingError> {
+        let Self {
+            target, part, out, ..
+        } = self;
+        let written = match out {
+            Out::Csv { mut out, .. } => out.flush(),
+            Out::Mcap(log) => log.finish().map_err(std::io::Error::other),
+        };
+        written
+            .and_then(|()| File::open(&part)?.sync_all())
+            .map_err(|e| io(&part, "write", &e))?;
+        std::fs::rename(&part, &target)
+            .map_err(|e| io(&target, "rename the finished log to", &e))?;
+        Ok(target)
     }
 }
 

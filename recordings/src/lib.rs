@@ -25,6 +25,7 @@ mod error;
 mod fault;
 mod faults;
 mod map;
+mod mcap_log;
 mod model_file;
 mod plan;
 mod segment;

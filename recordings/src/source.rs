@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::csv_read::parse_csv;
 use crate::error::RecordingError;
+use crate::mcap_log::{is_mcap, read_mcap};
 use crate::sysid::{SysIdLog, read_sysid};
 use crate::table::Table;
 
@@ -35,7 +36,7 @@ impl Source {
     }
 }
 
-/// Reads a log: CSV with a header, or SysId JSON.
+/// Reads a log: CSV with a header, SysId JSON, or an MCAP file that a loop wrote.
 ///
 /// # Errors
 ///
@@ -55,6 +56,9 @@ pub fn read(path: &Path) -> Result<Source, RecordingError> {
 }
 
 fn read_bytes(bytes: &[u8], log: &str) -> Result<Source, RecordingError> {
+    if is_mcap(bytes) {
+        return read_mcap(bytes, log).map(Source::Table);
+    }
     let text = as_text(bytes, log)?;
     match text.trim_start().chars().next() {
         Some('{') => read_sysid(text, log).map(Source::SysId),

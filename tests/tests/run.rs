@@ -198,6 +198,23 @@ fn a_supervisor_stops_with_its_reason_in_log_page_and_status() {
     assert!(compared.unwrap().status.success());
 }
 
+#[test]
+fn a_log_may_be_mcap() {
+    let desk = Desk::with(LOOP);
+    for log in ["run.csv", "run.mcap"] {
+        let run = desk.command(&["run", "loop.toml", "-o", log]).output();
+        assert!(run.unwrap().status.success());
+    }
+    let [csv, mcap] = ["run.csv", "run.mcap"].map(|log| {
+        let compared = desk.command(&["compare", "model.toml", log, "--json"]);
+        let output = { compared }.output().unwrap();
+        assert!(output.status.success(), "{log}");
+        let said = serde_json::from_slice::<Value>(&output.stdout).unwrap();
+        number(&said["nrmse"])
+    });
+    assert!((csv - mcap).abs() < 1e-9 * csv, "{csv} {mcap}");
+}
+
 /// What was said at a second is on the disk a second later, whatever happens then.
 #[test]
 #[cfg(unix)]

@@ -6,26 +6,26 @@
     reason = "what is written here can be read, and a panic is how this program fails"
 )]
 
+mod parts;
+
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
-use loopsight_controllers::{FeedbackLinearizingPiSettings, PerChannel, Rule};
 use loopsight_core::Parameter;
 use loopsight_core::config::Source;
 use loopsight_core::excitation::{Between, Excitation};
 use loopsight_core::identification::LearningSettings;
-use loopsight_core::limits::SignalLimits;
 use loopsight_core::loop_file::LoopFile;
 use loopsight_core::model::{FitOptions, Model, ModelFile, SimulationOptions, misfit};
-use loopsight_core::registry::{ControllerPart, DriverPart, EstimatorPart, effects, parts, plants};
+use loopsight_core::registry::{
+    ControllerPart, DriverPart, EstimatorPart, effects, parts as linked, plants,
+};
 use loopsight_core::regression::Scheme;
 use loopsight_core::run::{Column, ColumnMap, Hold, LogMap, Measured};
 use loopsight_core::sensor::{Encoder, Sensor};
-use loopsight_core::supervisor::SupervisorSettings;
-use loopsight_drivers::{Limit, Replay, SensorFault, Simulated};
-use loopsight_estimators::{Forgetting, RlsSettings};
 use loopsight_plants as _;
 use loopsight_tests as _;
+use parts::{controller, driver, estimator, limits, supervisor};
 use proptest::collection::{btree_map, vec};
 use proptest::option;
 use proptest::prelude::*;
@@ -351,149 +351,6 @@ proptest! {
     }
 }
 
-fn per_channel() -> impl Strategy<Value = PerChannel> {
-    prop_oneof![
-        finite().prop_map(PerChannel::All),
-        vec(finite(), 0..4).prop_map(PerChannel::Each),
-    ]
-}
-
-fn controller() -> impl Strategy<Value = FeedbackLinearizingPiSettings> {
-    let rule = option::of(select(vec![Rule::Paper, Rule::Exact]));
-    let channel = || option::of(per_channel());
-    (
-        channel(),
-        channel(),
-        channel(),
-        channel(),
-        rule,
-        channel(),
-        (option::of(vec(finite(), 0..3)), any::<bool>()),
-    )
-        .prop_map(
-            |(proportional, integral, settling_time_s, damping, rule, limit, more)| {
-                let (open_loop_acceleration, feedforward) = more;
-                FeedbackLinearizingPiSettings {
-                    proportional,
-                    integral,
-                    settling_time_s,
-                    damping,
-                    rule,
-                    feedforward,
-                    limit,
-                    open_loop_acceleration,
-                }
-            },
-        )
-}
-
-fn estimator() -> impl Strategy<Value = RlsSettings> {
-    let rule = prop_oneof![
-        Just(Forgetting::Constant),
-        Just(Forgetting::Variable),
-        Just(Forgetting::Directional),
-    ];
-    let limits = (option::of(finite()), option::of(finite()));
-    (finite(), rule, finite(), limits).prop_map(
-        |(forgetting, rule, initial_covariance, (least_forgetting, covariance_limit))| {
-            RlsSettings {
-                forgetting,
-                rule,
-                least_forgetting,
-                initial_covariance,
-                covariance_limit,
-            }
-        },
-    )
-}
-
-fn simulated() -> impl Strategy<Value = Simulated> {
-    let limit = option::of(prop_oneof![
-        finite().prop_map(Limit::All),
-        btree_map(name(), finite(), 0..3).prop_map(Limit::Each),
-    ]);
-    (
-        option::of(name()),
-        option::of(finite()),
-        btree_map(name(), finite(), 0..3),
-        seed(),
-        limit,
-        any::<bool>(),
-        vec(fault(), 0..3),
-    )
-        .prop_map(
-            |(model, step_s, noise, seed, limit, quantize, fault)| Simulated {
-                model,
-                step_s,
-                noise,
-                seed,
-                limit,
-                quantize,
-                fault,
-            },
-        )
-}
-
-fn fault() -> impl Strategy<Value = SensorFault> {
-    let span = (finite(), option::of(finite()));
-    prop_oneof![
-        (option::of(name()), span.clone()).prop_map(|(of, (start_s, duration_s))| {
-            SensorFault::DeadEncoder {
-                of,
-                start_s,
-                duration_s,
-            }
-        }),
-        (name(), span.clone()).prop_map(|(signal, (start_s, duration_s))| SensorFault::Frozen {
-            signal,
-            start_s,
-            duration_s,
-        }),
-        (finite(), span).prop_map(|(share, (start_s, duration_s))| SensorFault::Stale {
-            share,
-            start_s,
-            duration_s,
-        }),
-    ]
-}
-
-fn limits() -> impl Strategy<Value = SignalLimits> {
-    (option::of(finite()), option::of(finite()))
-        .prop_map(|(magnitude, rate)| SignalLimits { magnitude, rate })
-}
-
-fn supervisor() -> impl Strategy<Value = SupervisorSettings> {
-    (
-        vec(finite(), 9),
-        btree_map(name(), finite(), 0..3),
-        btree_map(name(), proptest::array::uniform2(finite()), 0..3),
-        any::<u32>(),
-    )
-        .prop_map(|(numbers, tracking, range, falls)| SupervisorSettings {
-            window_s: numbers[0],
-            worse: numbers[1],
-            innovation: numbers[2],
-            innovation_s: numbers[3],
-            tracking,
-            tracking_share: numbers[4],
-            tracking_s: numbers[5],
-            range,
-            frozen_s: numbers[6],
-            stale_s: numbers[7],
-            calm_s: numbers[8],
-            falls,
-        })
-}
-
-fn driver() -> impl Strategy<Value = Box<dyn DriverPart>> {
-    prop_oneof![
-        simulated().prop_map(|part| Box::new(part) as Box<dyn DriverPart>),
-        (name(), option::of(name())).prop_map(|(recording, run)| {
-            Box::new(Replay { recording, run }) as Box<dyn DriverPart>
-        }),
-    ]
-}
-
 proptest! {
     #![proptest_config(config(256))]
     #[test]
@@ -549,7 +406,7 @@ proptest! {
             #[serde(skip_serializing_if = "Option::is_none")]
             driver: Option<Box<dyn DriverPart>>,
         }
-        let all = parts();
+        let all = linked();
         let (first, second): (Example, Example) = twice(index.get(&all).example);
         prop_assert_eq!(format!("{first:?}"), format!("{second:?}"));
     }
