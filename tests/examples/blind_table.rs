@@ -1,7 +1,7 @@
 //! The blind table: recordings that hide an effect, and what a diagnosis finds in them.
 //!
 //! `cargo run --release -p loopsight-tests --example blind_table -- [--sizes 0.5,1,2]
-//! [--experiments prbs,mixed] [--seeds 2] [--first 31] [--clean 20] [--only coulomb_friction,arm,tank_pair_dead_zone] [--write FILE]`
+//! [--experiments prbs,mixed] [--seeds 2] [--first 31] [--clean 20] [--only coulomb_friction,arm,tank_pair_dead_zone] [--windings 1e-4] [--write FILE]`
 //!
 //! `--only` takes effects, machines, and recordings by the name of their folder in
 //! `examples/hidden-effect`.
@@ -19,7 +19,7 @@ use loopsight_plants as _;
 use rayon::prelude::*;
 
 /// Windings of a motor with an ironless rotor, s.
-const WINDINGS: f64 = 1e-4;
+const WINDINGS: &str = "1e-4";
 
 /// What stands above the table in a file.
 const HEADER: &str = "\
@@ -36,13 +36,18 @@ seeds. Remade by
 comes first, or the log cannot show it and is said to show none, or not what it is. `seen in the log`: a refit of the
 plain model leaves at least 1.15 times the floor. Errors are those on the multi-level recording, means
 over the row; `floor` is what the resolution of the encoders alone leaves there. `parameter error` is
-the median over the effect's parameters where the truth has the form of the effect; `in the interval`
-counts those whose 95 % interval holds the truth.
+the median over the effect's parameters that have an interval, where the truth has the form of the effect;
+`in the interval` counts those whose 95 % interval holds the truth. The windings of these machines have a
+time constant of 0.1 ms that no model knows of: it is too little to be seen, but delays and lags take it for
+their own, and friction under pseudo-random voltages that reverse at once. `--windings 1e-6` is without.
 
 ";
 
 /// A refit of the plain model leaves less than this multiple of the floor: nothing shows.
 const INVISIBLE: f64 = 1.15;
+
+/// An error of ten times the signal's own deviation: a model that runs away.
+const ASTRAY: f64 = 10.0;
 
 struct Row {
     what: String,
@@ -100,6 +105,7 @@ fn main() {
     let first: u64 = value("--first", "31").parse().unwrap_or(31);
     let clean: u64 = value("--clean", "20").parse().unwrap_or(20);
     let only = value("--only", "");
+    let windings: f64 = value("--windings", WINDINGS).parse().unwrap_or(1e-4);
 
     let mut jobs: Vec<(Robot, Option<Hidden>, Experiment, f64, u64)> = Vec::new();
     for (robot, effect) in catalogue() {
@@ -125,7 +131,7 @@ fn main() {
     let rows: Vec<Row> = jobs
         .par_iter()
         .filter_map(|(robot, effect, experiment, size, seed)| {
-            let row = try_one(*robot, *effect, *experiment, *size, *seed)?;
+            let row = try_one(*robot, *effect, *experiment, *size, *seed, windings)?;
             eprintln!(
                 "{} {:30} {:6} size {:3} seed {:3}: {:60} {:6.2} -> {:6.2} floor {:5.2} {}",
                 if row.right { "ok   " } else { "WRONG" },
@@ -163,15 +169,16 @@ fn try_one(
     experiment: Experiment,
     size: f64,
     seed: u64,
+    windings: f64,
 ) -> Option<Row> {
     let hidden: Vec<(Hidden, f64)> = effect.map(|e| (e, size)).into_iter().collect();
-    let log = record_with(robot, &hidden, experiment, seed, WINDINGS).ok()?;
+    let log = record_with(robot, &hidden, experiment, seed, windings).ok()?;
     let test = record_with(
         robot,
         &hidden,
         Experiment::MultiLevel,
         1000 + seed,
-        WINDINGS,
+        windings,
     )
     .ok()?;
     let (model, _) = Model::from_toml("hidden", &log.model_toml).ok()?;
@@ -287,6 +294,7 @@ fn estimates(rows: &[&Row]) -> String {
         .collect();
     let mut errors: Vec<f64> = held
         .iter()
+        .filter(|h| h.covered.is_some())
         .map(|h| h.relative_error())
         .filter(|e| e.is_finite())
         .collect();
@@ -312,16 +320,24 @@ fn render(rows: &[Row]) -> String {
     names.dedup();
     for name in names {
         let of: Vec<&Row> = rows.iter().filter(|r| r.what == name).collect();
-        let mean = |f: &dyn Fn(&Row) -> f64| of.iter().map(|r| f(r)).sum::<f64>() / of.len() as f64;
+        // A free run that left the measurements altogether has no error worth a mean.
+        let mean = |f: &dyn Fn(&Row) -> f64| {
+            let near: Vec<f64> = of.iter().map(|r| f(r)).filter(|e| *e < ASTRAY).collect();
+            let mean = 100.0 * near.iter().sum::<f64>() / near.len() as f64;
+            match of.len() - near.len() {
+                0 => format!("{mean:.2} %"),
+                gone => format!("{mean:.2} %, {gone} astray"),
+            }
+        };
         let _ = writeln!(
             text,
-            "| {name} | {}/{} | {} | {:.2} % | {:.2} % | {:.2} % | {} |",
+            "| {name} | {}/{} | {} | {} | {} | {} | {} |",
             of.iter().filter(|r| r.right).count(),
             of.len(),
             of.iter().filter(|r| !r.hidden_well).count(),
-            100.0 * mean(&|r| r.before),
-            100.0 * mean(&|r| r.after),
-            100.0 * mean(&|r| r.floor),
+            mean(&|r| r.before),
+            mean(&|r| r.after),
+            mean(&|r| r.floor),
             estimates(&of),
         );
     }
