@@ -3,6 +3,8 @@
 //! Host drivers (feature `std`): [`Simulated`], any plant as the robot, and [`Replay`], a recording
 //! as the robot. Both are parts of a loop file, `[driver.<id>]`, and are found in the registry by
 //! whoever says `use loopsight_drivers as _;`.
+//!
+//! Without `std`: [`twil_motor`], motors and encoders on the pins of a board.
 
 #![cfg_attr(not(feature = "std"), no_std)]
 
@@ -21,6 +23,7 @@ mod replay;
 mod robot;
 #[cfg(feature = "std")]
 mod simulated;
+pub mod twil_motor;
 
 #[cfg(feature = "std")]
 pub use batch::simulate_inputs;
