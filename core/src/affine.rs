@@ -159,6 +159,12 @@ impl Affine {
         &self.treatments
     }
 
+    /// For each controlled state the change from rest over which what efforts depend on its sign has
+    /// grown up, in its unit; 0 where nothing does. For who compensates friction elsewhere.
+    pub fn bands(&self) -> &[f64] {
+        &self.bands
+    }
+
     /// Makes everything follow from values that changed.
     fn use_learned(&mut self) {
         if !std::mem::take(&mut self.learned) {

@@ -90,15 +90,18 @@ pub trait Plant<const NX: usize, const NU: usize, const NW: usize, const NP: usi
     }
 }
 
-/// A plant whose controlled states obey `dy/dt = f(y) + G(y) u`, for controllers that invert `G`.
+/// A plant whose controlled states obey `dy/dt = f(y) + G(y) u + H(y) w`, for controllers that invert
+/// `G`.
 ///
-/// `M` controlled states, `NU` inputs; written in `no_std` code where the run-time probing of
-/// [`Dynamics`] would cost too much.
-pub trait ControlAffine<const M: usize, const NU: usize, const NP: usize> {
+/// `M` controlled states, `NU` inputs, `NW` effort channels; written for `no_std` code where the
+/// run-time probing of [`Dynamics`] would cost too much.
+pub trait ControlAffine<const M: usize, const NU: usize, const NW: usize, const NP: usize> {
     /// The drift `f(y)`, in units of the controlled states per second.
     fn drift<S: Real>(y: &[S; M], p: &[S; NP]) -> [S; M];
     /// The input matrix `G(y)`, row by row.
     fn input_matrix<S: Real>(y: &[S; M], p: &[S; NP]) -> [[S; NU]; M];
+    /// What efforts `w` on the plant's channels add to the rates: `H(y) w`.
+    fn push<S: Real>(y: &[S; M], w: &[S; NW], p: &[S; NP]) -> [S; M];
 }
 
 /// The object-safe view of a plant for one scalar, on slices.

@@ -206,12 +206,15 @@ impl Plant<2, 1, 2, 3, 5> for DcAxis {
     }
 }
 
-impl ControlAffine<1, 1, 3> for DcAxis {
+impl ControlAffine<1, 1, 2, 3> for DcAxis {
     fn drift<S: Real>(y: &[S; 1], p: &[S; 3]) -> [S; 1] {
         [p[0] * y[0]]
     }
     fn input_matrix<S: Real>(_y: &[S; 1], p: &[S; 3]) -> [[S; 1]; 1] {
         [[p[1]]]
+    }
+    fn push<S: Real>(_y: &[S; 1], w: &[S; 2], p: &[S; 3]) -> [S; 1] {
+        [p[1] * w[0] + w[1]]
     }
 }
 

@@ -207,7 +207,7 @@ fn quotient<S: Real>(a: S, b: S) -> S {
 }
 
 /// `u' = -f2(u) + G2 V`, (27)–(29): the drift is `-f2`, the input matrix `G2`.
-impl ControlAffine<2, 2, 8> for Ddmr {
+impl ControlAffine<2, 2, 4, 8> for Ddmr {
     fn drift<S: Real>(y: &[S; 2], p: &[S; 8]) -> [S; 2] {
         let [v, omega] = *y;
         let [k_a, k_b, _, k_d, k_e, ..] = *p;
@@ -217,6 +217,12 @@ impl ControlAffine<2, 2, 8> for Ddmr {
     fn input_matrix<S: Real>(_y: &[S; 2], p: &[S; 8]) -> [[S; 2]; 2] {
         let [_, _, k_c, _, _, k_f, ..] = *p;
         [[k_c, k_c], [k_f, -k_f]]
+    }
+
+    fn push<S: Real>(_y: &[S; 2], w: &[S; 4], p: &[S; 8]) -> [S; 2] {
+        let [_, _, k_c, _, _, k_f, ..] = *p;
+        let [right, left, forward, yaw] = *w;
+        [k_c * (right + left) + forward, k_f * (right - left) + yaw]
     }
 }
 
@@ -310,12 +316,13 @@ mod tests {
     #[test]
     fn control_affine_view_agrees_with_the_derivative() {
         let p = [-15.146, 0.005, 0.136, -9.573, -3.945, 0.656, 0.131, 0.05];
-        let (y, u) = ([0.1, -0.7], [5.0, -2.0]);
+        let (y, u, w) = ([0.1, -0.7], [5.0, -2.0], [0.3, -0.9, 0.2, -1.1]);
         let f = Ddmr::drift(&y, &p);
         let g = Ddmr::input_matrix(&y, &p);
-        let rate = Ddmr::derivative(&[y[0], y[1], 0.3, 0.0, 0.0, 0.0], &u, &[0.0; 4], &p);
+        let h = Ddmr::push(&y, &w, &p);
+        let rate = Ddmr::derivative(&[y[0], y[1], 0.3, 0.0, 0.0, 0.0], &u, &w, &p);
         for i in 0..2 {
-            let affine: f64 = f[i] + g[i][0] * u[0] + g[i][1] * u[1];
+            let affine: f64 = f[i] + g[i][0] * u[0] + g[i][1] * u[1] + h[i];
             assert!((affine - rate[i]).abs() < 1e-14);
         }
     }

@@ -195,12 +195,15 @@ impl Plant<2, 1, 1, 3, 0> for Oscillator {
     }
 }
 
-impl ControlAffine<1, 1, 3> for Oscillator {
+impl ControlAffine<1, 1, 1, 3> for Oscillator {
     fn drift<S: Real>(y: &[S; 1], p: &[S; 3]) -> [S; 1] {
         [-p[1] * y[0]]
     }
     fn input_matrix<S: Real>(_y: &[S; 1], p: &[S; 3]) -> [[S; 1]; 1] {
         [[p[2]]]
+    }
+    fn push<S: Real>(_y: &[S; 1], w: &[S; 1], p: &[S; 3]) -> [S; 1] {
+        [p[2] * w[0]]
     }
 }
 

@@ -12,13 +12,18 @@ use cargo_metadata::{DependencyKind, Edition, Metadata, MetadataCommand};
 use loopsight_tests::repository;
 
 /// Each room, and the rooms it may depend on. Siblings do not stand in each other's line.
-const ARROWS: [(&str, &[&str]); 12] = [
+const ARROWS: [(&str, &[&str]); 13] = [
     ("core", &[]),
     ("link", &[]),
     ("plants", &["core"]),
     ("estimators", &["core"]),
     ("controllers", &["core"]),
     ("drivers", &["core"]),
+    // What runs on a robot is composed at build time, of everything that runs there.
+    (
+        "onboard",
+        &["core", "link", "plants", "estimators", "controllers"],
+    ),
     ("recordings", &["core"]),
     // Machines that hide an effect share no equations with the plants they are held against.
     ("hidden", &["core", "recordings"]),

@@ -1,0 +1,262 @@
+//! The conversation of a robot with its host.
+
+use loopsight_core::{ControlAffine, Plant};
+use loopsight_link::{
+    Act, Configuration, Decoder, Hello, Measured, Note, PARAMETERS, Reason, Reply, Request,
+    SIGNALS, Unusable, VERSION, Welcome,
+};
+
+use crate::Robot;
+use crate::watch::Watch;
+
+/// Tells what a tick costs, in a unit of the board's own.
+pub trait Meter {
+    /// Called before a tick.
+    fn start(&mut self);
+    /// Called after it; the cost.
+    fn stop(&mut self) -> u32;
+}
+
+/// Nothing is measured.
+impl Meter for () {
+    fn start(&mut self) {}
+    fn stop(&mut self) -> u32 {
+        0
+    }
+}
+
+/// A robot as its host talks to it: greeted, configured, running, at rest.
+///
+/// At any end of a run the motors are let go, the reason is said, and nothing but a new configuration
+/// lets the robot move again. Reasons are those of [`Reason`]:
+///
+/// * nothing to act upon for longer than the watchdog allows, whatever else came over the line;
+/// * messages of another session, or steps that do not follow one another: one side was started anew;
+/// * measurements that are too old, are no numbers, or do not move while the motors are driven;
+/// * a supply that sags.
+pub struct Session<
+    P,
+    M,
+    const NX: usize,
+    const NU: usize,
+    const NW: usize,
+    const NP: usize,
+    const NY: usize,
+    const R: usize,
+> {
+    meter: M,
+    period_us: u32,
+    decoder: Decoder,
+    session: u32,
+    greeted: bool,
+    run: Option<Run<P, NX, NU, NW, NP, NY, R>>,
+    tick: u32,
+    dropped: u32,
+    cost: u32,
+}
+
+struct Run<
+    P,
+    const NX: usize,
+    const NU: usize,
+    const NW: usize,
+    const NP: usize,
+    const NY: usize,
+    const R: usize,
+> {
+    robot: Robot<P, NX, NU, NW, NP, NY, R>,
+    watch: Watch<NU>,
+    /// A step has come since the configuration.
+    begun: bool,
+}
+
+impl<
+    P,
+    M,
+    const NX: usize,
+    const NU: usize,
+    const NW: usize,
+    const NP: usize,
+    const NY: usize,
+    const R: usize,
+> Session<P, M, NX, NU, NW, NP, NY, R>
+where
+    P: Plant<NX, NU, NW, NP, NY> + ControlAffine<NU, NU, NW, NP>,
+    M: Meter,
+{
+    /// A robot that was just switched on.
+    pub fn new(period_us: u32, meter: M) -> Self {
+        const {
+            assert!(
+                NU <= SIGNALS && NP <= PARAMETERS,
+                "a message does not hold this plant"
+            );
+        }
+        Self {
+            meter,
+            period_us,
+            decoder: Decoder::default(),
+            session: 0,
+            greeted: false,
+            run: None,
+            tick: 0,
+            dropped: 0,
+            cost: 0,
+        }
+    }
+
+    fn period(&self) -> f64 {
+        f64::from(self.period_us) * 1e-6
+    }
+
+    /// What the motors get; `None`: they are at rest.
+    pub fn output(&self) -> Option<&[f32; NU]> {
+        self.run
+            .as_ref()
+            .filter(|run| run.begun)
+            .map(|run| run.robot.applied())
+    }
+
+    /// Takes one byte of the line. Broken frames are counted, and not answered: who waits for the answer
+    /// notices.
+    pub fn take(&mut self, byte: u8, say: &mut dyn FnMut(&Reply)) {
+        match self.decoder.take::<Request>(byte) {
+            Some(Ok(request)) => self.answer(request, say),
+            Some(Err(_)) => self.dropped = self.dropped.saturating_add(1),
+            None => {}
+        }
+    }
+
+    /// A period of the board's timer has gone by.
+    pub fn elapsed(&mut self, say: &mut dyn FnMut(&Reply)) {
+        let dropped = core::mem::take(&mut self.dropped);
+        if dropped > 0 {
+            say(&Reply::Log(Note::Dropped(dropped)));
+        }
+        if let Some(run) = self.run.as_mut().filter(|run| run.begun)
+            && let Err(reason) = run.watch.elapsed()
+        {
+            self.rest(reason, say);
+        }
+    }
+
+    /// Lets the motors go, and says why.
+    fn rest(&mut self, reason: Reason, say: &mut dyn FnMut(&Reply)) {
+        self.run = None;
+        say(&Reply::Stopped {
+            session: self.session,
+            tick: self.tick,
+            reason,
+        });
+    }
+
+    fn answer(&mut self, request: Request, say: &mut dyn FnMut(&Reply)) {
+        let session = match &request {
+            Request::Hello(hello) => return self.greet(*hello, say),
+            Request::Configure { session, .. } | Request::Stop { session } => *session,
+            Request::Step(step) => step.session,
+        };
+        if !self.greeted || session != self.session {
+            return self.rest(Reason::OtherSession, say);
+        }
+        let done = match request {
+            Request::Configure { configuration, .. } => self.configure(&configuration, say),
+            Request::Step(step) => self.step(&step, say),
+            Request::Stop { .. } => Err(Reason::Asked),
+            Request::Hello(_) => Ok(()),
+        };
+        if let Err(reason) = done {
+            self.rest(reason, say);
+        }
+    }
+
+    fn greet(&mut self, hello: Hello, say: &mut dyn FnMut(&Reply)) {
+        if self.run.as_ref().is_some_and(|run| run.begun) {
+            self.rest(Reason::HostRestarted, say);
+        }
+        self.run = None;
+        self.session = hello.session;
+        self.greeted = hello.version == VERSION;
+        self.tick = 0;
+        let mut plant = heapless::String::new();
+        // An identifier that is too long for a message is one that no host asks for.
+        let _ = plant.push_str(P::META.id);
+        say(&Reply::Hello(Welcome {
+            hello: Hello {
+                version: VERSION,
+                session: hello.session,
+            },
+            period_us: self.period_us,
+            plant,
+        }));
+        if !self.greeted {
+            let (expected, found) = (VERSION, hello.version);
+            self.rest(Reason::Version { expected, found }, say);
+        }
+    }
+
+    /// A configuration that cannot be used stops a robot that runs: what its host believes of it would not
+    /// be true.
+    fn configure(
+        &mut self,
+        configuration: &Configuration,
+        say: &mut dyn FnMut(&Reply),
+    ) -> Result<(), Reason> {
+        let period = self.period();
+        let unusable = |what: Unusable| Reason::Configuration(what);
+        let watch = Watch::new::<P, NX, NW, NP, NY>(&configuration.safety).map_err(unusable)?;
+        match self.run.as_mut().filter(|run| run.begun) {
+            Some(run) => {
+                run.robot.improve(configuration, period).map_err(unusable)?;
+                run.watch = watch;
+            }
+            None => {
+                self.run = Some(Run {
+                    robot: Robot::new(configuration, period).map_err(unusable)?,
+                    watch,
+                    begun: false,
+                });
+                self.tick = 0;
+            }
+        }
+        say(&Reply::Configured {
+            session: self.session,
+        });
+        Ok(())
+    }
+
+    fn step(&mut self, step: &Measured, say: &mut dyn FnMut(&Reply)) -> Result<(), Reason> {
+        let run = self.run.as_mut().ok_or(Reason::NotConfigured)?;
+        if step.tick != self.tick {
+            let (expected, found) = (self.tick, step.tick);
+            return Err(Reason::OutOfOrder { expected, found });
+        }
+        let fresh = run.watch.heard(step)?;
+        let finite = |list: &[f32]| list.iter().all(|v| v.is_finite());
+        let measured = <[f32; NU]>::try_from(step.measured.as_slice()).ok();
+        let measured = measured.filter(|m| finite(m)).ok_or(Reason::NotFinite)?;
+        if step.reference.len() != NU || !finite(&step.reference) {
+            return Err(Reason::NotFinite);
+        }
+        let (applied, parameters) = (run.robot.applied(), run.robot.parameters());
+        run.watch
+            .turned::<P, NX, NW, NP, NY>(applied, &measured, parameters)?;
+        self.meter.start();
+        let done = run.robot.tick(measured, fresh, &step.reference);
+        let cost = core::mem::replace(&mut self.cost, self.meter.stop());
+        let done = done.ok_or(Reason::NoCommand)?;
+        run.begun = true;
+        self.tick = self.tick.wrapping_add(1);
+        say(&Reply::Act(Act {
+            session: self.session,
+            tick: step.tick,
+            command: done.applied.iter().copied().collect(),
+            parameters: run.robot.parameters().iter().copied().collect(),
+            saturated: done.outcome.saturated,
+            held: done.outcome.held,
+            learned: run.robot.learned(),
+            cost,
+        }));
+        Ok(())
+    }
+}

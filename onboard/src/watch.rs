@@ -1,0 +1,117 @@
+//! What a robot watches over by itself, message or none.
+
+use heapless::Vec;
+use loopsight_core::{Place, Plant, Role};
+use loopsight_link::{Measured, Reason, SIGNALS, Safety, Unusable};
+
+/// Speed of a shaft, in its unit, below which its encoder counts nothing.
+const STILL: f32 = 1e-6;
+
+/// Counts what must not last.
+pub(crate) struct Watch<const NU: usize> {
+    safety: Safety,
+    quiet: u16,
+    stale: u16,
+    still: [u16; SIGNALS],
+    wheels: Vec<Wheel, SIGNALS>,
+}
+
+/// A motor and its encoder: which input drives which of the plant's outputs.
+#[derive(Clone, Copy)]
+struct Wheel {
+    input: usize,
+    output: usize,
+}
+
+impl<const NU: usize> Watch<NU> {
+    pub(crate) fn new<P, const NX: usize, const NW: usize, const NP: usize, const NY: usize>(
+        safety: &Safety,
+    ) -> Result<Self, Unusable>
+    where
+        P: Plant<NX, NU, NW, NP, NY>,
+    {
+        let usable = safety.watchdog_ticks > 0
+            && safety.stale_ticks > 0
+            && safety.encoder_ticks > 0
+            && safety.least_supply.is_finite()
+            && safety.encoder_input > 0.0;
+        if !usable {
+            return Err(Unusable::Safety);
+        }
+        let mut wheels = Vec::new();
+        for channel in P::META.channels {
+            let (Place::Effort(_), Some(drive), Some(flow)) = (
+                channel.place,
+                channel.read(Role::Drive),
+                channel.read(Role::Flow),
+            ) else {
+                continue;
+            };
+            let input = P::META.inputs.iter().position(|s| s.id == drive);
+            let output = P::META.outputs.iter().position(|s| s.id == flow);
+            if let (Some(input), Some(output)) = (input, output) {
+                let wheel = Wheel { input, output };
+                wheels.push(wheel).map_err(|_| Unusable::Plant)?;
+            }
+        }
+        Ok(Self {
+            safety: *safety,
+            quiet: 0,
+            stale: 0,
+            still: [0; SIGNALS],
+            wheels,
+        })
+    }
+
+    /// A period has gone by.
+    pub(crate) fn elapsed(&mut self) -> Result<(), Reason> {
+        self.quiet = self.quiet.saturating_add(1);
+        if self.quiet > self.safety.watchdog_ticks {
+            return Err(Reason::LinkLost);
+        }
+        Ok(())
+    }
+
+    /// A message to act upon has come; whether its measurement is young enough to learn from.
+    pub(crate) fn heard(&mut self, step: &Measured) -> Result<bool, Reason> {
+        self.quiet = 0;
+        if step.supply.is_nan() || step.supply < self.safety.least_supply {
+            return Err(Reason::SupplyLow);
+        }
+        let fresh = step.age_us <= self.safety.stale_us;
+        self.stale = if fresh {
+            0
+        } else {
+            self.stale.saturating_add(1)
+        };
+        if self.stale > self.safety.stale_ticks {
+            return Err(Reason::Stale);
+        }
+        Ok(fresh)
+    }
+
+    /// Compares what the motors got with what their encoders say of it.
+    pub(crate) fn turned<P, const NX: usize, const NW: usize, const NP: usize, const NY: usize>(
+        &mut self,
+        applied: &[f32; NU],
+        y: &[f32; NU],
+        p: &[f32; NP],
+    ) -> Result<(), Reason>
+    where
+        P: Plant<NX, NU, NW, NP, NY>,
+    {
+        let mut x = [0.0; NX];
+        for (state, value) in P::META.controlled.iter().zip(y) {
+            x[*state] = *value;
+        }
+        for (wheel, still) in self.wheels.iter().zip(&mut self.still) {
+            let driven = applied[wheel.input].abs() > self.safety.encoder_input;
+            let turns = P::output(wheel.output, &x, applied, p).abs() > STILL;
+            *still = if driven && !turns { *still + 1 } else { 0 };
+            if *still >= self.safety.encoder_ticks {
+                return Err(Reason::EncoderLost(wheel.input as u8));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,103 @@
+//! The firmware on an emulated board, at the other end of a socket.
+
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "shared by tests, each of which uses some of it"
+)]
+
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+use loopsight_link::{Decoder, LONGEST, Note, Reply, Request, encode};
+
+/// `-icount shift=6`: one instruction takes 64 ns of the board's time, a count of its timer 40 ns.
+const SHIFT: u32 = 6;
+/// What a count of the board's timer is worth.
+pub(crate) const INSTRUCTIONS_PER_COUNT: f64 = 40.0 / (1u32 << SHIFT) as f64;
+
+pub(crate) struct Board {
+    machine: Child,
+    line: UnixStream,
+    decoder: Decoder,
+    /// What has come and was not looked at.
+    rest: Vec<u8>,
+}
+
+impl Board {
+    /// Switches a board on and waits for what it says first.
+    pub(crate) fn start() -> Self {
+        let firmware = std::env::var("LOOPSIGHT_FIRMWARE")
+            .expect("LOOPSIGHT_FIRMWARE names the firmware, built as its README says");
+        static BOARDS: AtomicU32 = AtomicU32::new(0);
+        let number = BOARDS.fetch_add(1, Ordering::Relaxed);
+        let name = format!("loopsight-{}-{number}.line", std::process::id());
+        let socket = std::env::temp_dir().join(name);
+        let machine = Command::new("qemu-system-arm")
+            .args(["-machine", "mps2-an386", "-cpu", "cortex-m4"])
+            .args(["-display", "none", "-monitor", "none"])
+            .args(["-icount", &format!("shift={SHIFT}")])
+            .arg("-serial")
+            .arg(format!("unix:{},server=on,wait=on", socket.display()))
+            .args(["-kernel", &firmware])
+            .stdin(Stdio::null())
+            .spawn()
+            .expect("qemu-system-arm starts");
+        // It makes the socket, and waits for who opens it.
+        let open = || UnixStream::connect(&socket);
+        let line = (0..200).find_map(|_| {
+            std::thread::sleep(Duration::from_millis(50));
+            open().ok()
+        });
+        let line = line.expect("the machine opens its line");
+        line.set_read_timeout(Some(Duration::from_secs(30)))
+            .unwrap();
+        std::fs::remove_file(&socket).unwrap();
+        let mut board = Self {
+            machine,
+            line,
+            decoder: Decoder::default(),
+            rest: Vec::new(),
+        };
+        assert_eq!(board.listen(), Reply::Log(Note::Started));
+        board
+    }
+
+    /// The next message.
+    pub(crate) fn listen(&mut self) -> Reply {
+        loop {
+            let mut bytes = std::mem::take(&mut self.rest).into_iter();
+            while let Some(byte) = bytes.next() {
+                if let Some(reply) = self.decoder.take(byte) {
+                    self.rest = bytes.collect();
+                    return reply.expect("a frame that is whole");
+                }
+            }
+            let mut buffer = [0; 512];
+            let length = self.line.read(&mut buffer).expect("the board answers");
+            assert!(length > 0, "the board hung up");
+            self.rest.extend_from_slice(&buffer[..length]);
+        }
+    }
+
+    /// Says something; the answer.
+    pub(crate) fn ask(&mut self, request: &Request) -> Reply {
+        let mut buffer = [0; LONGEST];
+        let length = encode(request, &mut buffer).unwrap();
+        self.line.write_all(&buffer[..length]).unwrap();
+        self.listen()
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        // Nothing is left to be done about a machine that is gone already.
+        let _ = self.machine.kill();
+        let _ = self.machine.wait();
+    }
+}
