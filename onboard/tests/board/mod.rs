@@ -85,12 +85,27 @@ impl Board {
         }
     }
 
+    /// The next message that is no line for the log.
+    pub(crate) fn hear(&mut self) -> Reply {
+        loop {
+            match self.listen() {
+                Reply::Log(_) => {}
+                reply => return reply,
+            }
+        }
+    }
+
+    /// Writes bytes on the line.
+    pub(crate) fn send(&mut self, bytes: &[u8]) {
+        self.line.write_all(bytes).unwrap();
+    }
+
     /// Says something; the answer.
     pub(crate) fn ask(&mut self, request: &Request) -> Reply {
         let mut buffer = [0; LONGEST];
         let length = encode(request, &mut buffer).unwrap();
-        self.line.write_all(&buffer[..length]).unwrap();
-        self.listen()
+        self.send(&buffer[..length]);
+        self.hear()
     }
 }
 
