@@ -42,7 +42,17 @@ pub(crate) fn build(
     robot: Option<&Model>,
     runs: &[Run],
 ) -> Result<HostDriver, BuildError> {
-    part.build(&DriverContext {
+    within(model, robot, runs, |context| part.build(context))
+}
+
+/// Hands what [`build`] builds drivers with to `use_it`.
+pub(crate) fn within<T>(
+    model: &Model,
+    robot: Option<&Model>,
+    runs: &[Run],
+    use_it: impl FnOnce(&DriverContext<'_>) -> T,
+) -> T {
+    use_it(&DriverContext {
         model,
         period: 0.01,
         load_model: &|path| {

@@ -1,8 +1,8 @@
 //! What stands between a loop and a robot, one file per driver.
 //!
-//! Host drivers (feature `std`): [`Simulated`], any plant as the robot, and [`Replay`], a recording
-//! as the robot. Both are parts of a loop file, `[driver.<id>]`, and are found in the registry by
-//! whoever says `use loopsight_drivers as _;`.
+//! Host drivers (feature `std`): [`Simulated`], any plant as the robot, [`Replay`], a recording
+//! as the robot, and, on Linux, `LinuxGpio`, the pins of a board. They are parts of a loop file,
+//! `[driver.<id>]`, and are found in the registry by whoever says `use loopsight_drivers as _;`.
 //!
 //! Without `std`: [`twil_motor`], motors and encoders on the pins of a board.
 
@@ -18,6 +18,9 @@ mod fault;
 #[cfg(feature = "std")]
 mod fixture;
 #[cfg(feature = "std")]
+#[cfg(target_os = "linux")]
+mod linux_gpio;
+#[cfg(feature = "std")]
 mod replay;
 #[cfg(feature = "std")]
 mod robot;
@@ -31,6 +34,9 @@ pub use batch::simulate_inputs;
 pub use encoder::Counter;
 #[cfg(feature = "std")]
 pub use fault::SensorFault;
+#[cfg(feature = "std")]
+#[cfg(target_os = "linux")]
+pub use linux_gpio::{BridgeKind, Line, LinuxGpio, Motor, SupplySetting};
 #[cfg(feature = "std")]
 pub use replay::Replay;
 #[cfg(feature = "std")]
