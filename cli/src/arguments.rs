@@ -42,6 +42,8 @@ pub(crate) enum Command {
     Add(AddOptions),
     /// Diagnose, add, refit, until nothing more is missing.
     Improve(ImproveOptions),
+    /// Bring a robot up: is it wired as the files say? Step by step, wheels in the air.
+    Bringup(BringupOptions),
     /// Run a control loop.
     Run(RunOptions),
     /// Print a completion script for a shell.
@@ -275,4 +277,18 @@ pub(crate) struct RunOptions {
     /// Write a picture (SVG) for a text.
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BringupOptions {
+    /// Loop file; its [limits] have to say how large each input may be.
+    #[arg(value_name = "LOOP")]
+    pub(crate) file: PathBuf,
+    /// What the motors are first driven with, in the unit of the inputs; by default a quarter of the
+    /// smallest limit.
+    #[arg(long, value_name = "VOLTS")]
+    pub(crate) volts: Option<f64>,
+    /// How long a motor is driven at a time.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.6)]
+    pub(crate) seconds: f64,
 }

@@ -66,6 +66,7 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         Command::Experiment(options) => commands::experiment::run(options),
         Command::Add(options) => commands::add::run(options),
         Command::Improve(options) => commands::improve::run(options),
+        Command::Bringup(options) => commands::bringup::run(options),
         Command::Run(options) => commands::run::run(options),
         Command::Completions { shell } => {
             commands::completions::run(*shell);

@@ -1,6 +1,7 @@
 //! One file per command.
 
 pub(crate) mod add;
+pub(crate) mod bringup;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod completions;
