@@ -5,10 +5,11 @@
     reason = "a command that breaks its word is how this program fails"
 )]
 
-use std::io::Write as _;
-use std::process::{Command, Output, Stdio};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::process::{Child, Command, Output, Stdio};
 
 use loopsight_tests::twil_path;
+use tempfile::TempDir;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_loopsight-under-test");
 
@@ -17,23 +18,23 @@ const LIMITS: &str = "[limits]\nvoltage_right = { magnitude = 12.0 }\nvoltage_le
 /// What a careful person says of a robot that is wired right; the last line is the tape's.
 const RIGHT: [&str; 8] = ["yes", "yes", "", "forwards", "", "forwards", "", "go"];
 
-/// A robot that is the Twil but for what `change` does to its file.
-fn walk(
+/// Bring-up of a robot that is the Twil but for what `change` does to its file, `top` standing above its
+/// loop file's tables.
+fn begin(
+    desk: &TempDir,
     change: impl FnOnce(String) -> String,
-    limits: &str,
+    (top, limits): (&str, &str),
     options: &[&str],
-    answers: &[&str],
-) -> (Output, String) {
-    let desk = tempfile::tempdir().unwrap();
+) -> Child {
     let model = std::fs::read_to_string(twil_path()).unwrap();
     std::fs::write(desk.path().join("model.toml"), &model).unwrap();
     std::fs::write(desk.path().join("robot.toml"), change(model)).unwrap();
     let file = format!(
-        "model = \"model.toml\"\nperiod_s = 0.01\n\n[driver.simulated]\nmodel = \"robot.toml\"\nlimit = 12.0\n\n\
+        "model = \"model.toml\"\nperiod_s = 0.01\n{top}\n[driver.simulated]\nmodel = \"robot.toml\"\nlimit = 12.0\n\n\
          [controller.feedback_linearizing_pi]\nsettling_time_s = 0.45\n\n{limits}"
     );
     std::fs::write(desk.path().join("loop.toml"), file).unwrap();
-    let mut child = Command::new(PROGRAM)
+    Command::new(PROGRAM)
         .current_dir(desk.path())
         .args(["bringup", "loop.toml"])
         .args(options)
@@ -41,7 +42,17 @@ fn walk(
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .unwrap();
+        .unwrap()
+}
+
+fn walk(
+    change: impl FnOnce(String) -> String,
+    limits: &str,
+    options: &[&str],
+    answers: &[&str],
+) -> (Output, String) {
+    let desk = tempfile::tempdir().unwrap();
+    let mut child = begin(&desk, change, ("", limits), options);
     let mut hand = child.stdin.take().unwrap();
     // A robot that was stopped asks no more questions, and reads no more answers.
     let _ = hand.write_all((answers.join("\n") + "\n").as_bytes());
@@ -170,4 +181,82 @@ fn the_scale_is_that_of_the_tape() {
     assert!(far.1.contains("26075.9 in the model file"), "{}", far.1);
     let right = said(&format!("{counted}"));
     fails(&right, 0, "scale   ok");
+}
+
+#[test]
+fn a_polite_kill_stops_a_robot_that_waits_for_an_answer() {
+    let desk = tempfile::tempdir().unwrap();
+    let mut child = begin(&desk, same, ("real_time = true\n", LIMITS), &[]);
+    // Held open: nobody has gone away.
+    let mut hand = child.stdin.take().unwrap();
+    hand.write_all(b"yes\nyes\n").unwrap();
+    let mut said = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.starts_with("Watch the motor") {
+        line.clear();
+        assert!(said.read_line(&mut line).unwrap() > 0);
+    }
+    let id = child.id().to_string();
+    assert!(Command::new("kill").arg(id).status().unwrap().success());
+    let mut rest = String::new();
+    said.read_to_string(&mut rest).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1), "{rest}");
+    assert!(
+        rest.contains("stopped by Ctrl-C; the robot was stopped"),
+        "{rest}"
+    );
+}
+
+/// The driver for boards is opened after the questions, and says what this machine has not.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_board_that_is_not_there_is_named_after_the_questions() {
+    let desk = tempfile::tempdir().unwrap();
+    let motor = |side: &str, channel: u32| {
+        format!(
+            "[driver.linux_gpio.motor.voltage_{side}]\npwm = [0, {channel}]\ndirection = 5\nenable = 6\n\
+             counter = [{channel}, 0]\nshaft = \"shaft_angle_{side}\"\nlimit_v = 12.0\n"
+        )
+    };
+    let encoder = |right: f64, left: f64| {
+        format!(
+            "sensor = {{ encoder_counts = {{ counts_per_revolution = 8192.0, \
+             of = {{ shaft_angle_right = {right:?}, shaft_angle_left = {left:?} }} }} }}\n"
+        )
+    };
+    let model = format!(
+        "[plant.ddmr]\nK_A = -15.0\nK_B = 0.0\nK_C = 0.136\nK_D = -9.6\nK_E = 0.0\nK_F = 0.66\nhalf_track = 0.131\n\
+         wheel_radius = 0.05\n[log.measured.linear_velocity]\n{}[log.measured.angular_velocity]\n{}",
+        encoder(0.025, 0.025),
+        encoder(0.19, -0.19)
+    );
+    std::fs::write(desk.path().join("model.toml"), model).unwrap();
+    let file = format!(
+        "model = \"model.toml\"\nperiod_s = 0.01\n[driver.linux_gpio]\nsupply = 12.0\nchip = \"gpiochip_nowhere\"\n\
+         {}{}[controller.feedback_linearizing_pi]\nsettling_time_s = 0.45\n{LIMITS}",
+        motor("right", 0),
+        motor("left", 1)
+    );
+    std::fs::write(desk.path().join("loop.toml"), file).unwrap();
+    let run = |command: &str| {
+        let mut child = Command::new(PROGRAM)
+            .current_dir(desk.path())
+            .args([command, "loop.toml"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let _ = child.stdin.take().unwrap().write_all(b"yes\nyes\n\n");
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8(output.stderr.clone()).unwrap();
+        (output, said)
+    };
+    assert!(run("check").0.status.success());
+    let opened = run("bringup");
+    fails(
+        &opened,
+        1,
+        "the motor of `voltage_right`: line 6 of gpiochip_nowhere",
+    );
 }

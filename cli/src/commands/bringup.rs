@@ -55,7 +55,11 @@ pub(crate) fn run(options: &BringupOptions) -> Result<(), Failure> {
             )));
         }
     }
-    let person = Person::new();
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&interrupted);
+    // A second handler (another command in the same process) is refused.
+    let _ = ctrlc::set_handler(move || seen.store(true, Ordering::SeqCst));
+    let person = Person::new(Arc::clone(&interrupted));
     for question in [
         "Do all wheels turn freely, off the ground, with nothing and nobody in their way? [yes/no]",
         "Can you cut the power of the motors at once? [yes/no]",
@@ -66,10 +70,6 @@ pub(crate) fn run(options: &BringupOptions) -> Result<(), Failure> {
             ));
         }
     }
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let seen = Arc::clone(&interrupted);
-    // A second handler is refused: then the first one ends the process, and the driver its motors.
-    let _ = ctrlc::set_handler(move || seen.store(true, Ordering::SeqCst));
     let host = composed.host;
     let bench = Bench::new(
         &model,

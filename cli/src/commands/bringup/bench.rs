@@ -34,7 +34,8 @@ pub(super) struct Bench<'m> {
     clock: Box<dyn Clock>,
     limits: Option<Limits<Vec<f64>>>,
     period: f64,
-    tick: u64,
+    /// When the next tick is due by the clock; none is before the first.
+    due: Option<f64>,
     stale_s: f64,
     measured: Vec<f64>,
     applied: Vec<f64>,
@@ -60,7 +61,7 @@ impl<'m> Bench<'m> {
             clock,
             limits,
             period,
-            tick: 0,
+            due: None,
             stale_s: 0.0,
             measured: vec![0.0; ny],
             applied: vec![0.0; nu],
@@ -88,10 +89,18 @@ impl<'m> Bench<'m> {
             .map_err(|e| Failure::work(format!("the robot could not be stopped safely: {e}")))
     }
 
+    /// Waits for the next period. Ticks that were missed are not made up for: a person took that time.
+    fn wait(&mut self) {
+        let due = self.due.unwrap_or_else(|| self.clock.now());
+        self.clock.wait_until(due);
+        let now = self.clock.now();
+        let late = now - due > self.period;
+        self.due = Some(if late { now } else { due } + self.period);
+    }
+
     /// Waits for the next period and reads; looks whether the robot may go on.
     fn read(&mut self) -> Result<(), Failure> {
-        self.clock.wait_until(self.tick as f64 * self.period);
-        self.tick += 1;
+        self.wait();
         if self.interrupted.load(Ordering::SeqCst) {
             return Err(self.fail("stopped by Ctrl-C".to_owned()));
         }
@@ -104,7 +113,8 @@ impl<'m> Bench<'m> {
         } else {
             self.stale_s + self.period
         };
-        if self.stale_s > STALE {
+        // Half a period for the rounding of the sum.
+        if self.stale_s > STALE + 0.5 * self.period {
             return Err(self.fail(format!("no fresh sample for {} s", output::number(STALE))));
         }
         for (i, m) in self.model.measured.iter().enumerate() {
@@ -209,5 +219,129 @@ impl Drop for Bench<'_> {
             // Whoever left early has said why.
             let _ = self.driver.safe_stop();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use loopsight_core::registry::HostDriverError;
+    use loopsight_core::{Driver, DriverFault, Sample};
+
+    use super::*;
+
+    /// What a driver was asked: `r`ead, `w`rite, `s`top; and a clock that a test turns.
+    #[derive(Clone, Default)]
+    struct Seen(Arc<Mutex<(String, f64, Vec<f64>)>>);
+
+    struct Fake {
+        seen: Seen,
+        measured: f64,
+        fresh: bool,
+        fails: bool,
+    }
+
+    impl Driver<f64> for Fake {
+        type Error = HostDriverError;
+        fn read(&mut self, measured: &mut [f64]) -> Result<Sample<f64>, HostDriverError> {
+            self.seen.0.lock().unwrap().0.push('r');
+            measured.fill(self.measured);
+            let (time, fresh) = (0.0, self.fresh);
+            Ok(Sample { time, fresh })
+        }
+        fn write(&mut self, command: &[f64], applied: &mut [f64]) -> Result<(), HostDriverError> {
+            self.seen.0.lock().unwrap().0.push('w');
+            applied.copy_from_slice(command);
+            let message = "a pin failed".to_owned();
+            let fault = DriverFault::Io;
+            if self.fails {
+                Err(HostDriverError { fault, message })
+            } else {
+                Ok(())
+            }
+        }
+        fn safe_stop(&mut self) -> Result<(), HostDriverError> {
+            self.seen.0.lock().unwrap().0.push('s');
+            Ok(())
+        }
+    }
+
+    impl Clock for Seen {
+        fn now(&mut self) -> f64 {
+            self.0.lock().unwrap().1
+        }
+        fn wait_until(&mut self, deadline: f64) {
+            let mut state = self.0.lock().unwrap();
+            state.2.push(deadline);
+            state.1 = state.1.max(deadline);
+        }
+    }
+
+    fn model() -> Model {
+        let text = "[plant.oscillator]\nstiffness_per_mass = 1.0\ndamping_per_mass = 1.0\ninverse_mass = 1.0\n[log.measured.position]\n";
+        Model::from_toml("model.toml", text).unwrap().0
+    }
+
+    fn bench<'m>(model: &'m Model, seen: &Seen, spoil: impl FnOnce(&mut Fake)) -> Bench<'m> {
+        let mut driver = Fake {
+            seen: seen.clone(),
+            measured: 0.0,
+            fresh: true,
+            fails: false,
+        };
+        spoil(&mut driver);
+        let interrupted = Arc::default();
+        let clock = Box::new(seen.clone());
+        Bench::new(model, Box::new(driver), clock, None, 0.01, interrupted)
+    }
+
+    #[test]
+    fn ticks_begin_when_the_first_is_asked_for_and_none_is_made_up_for() {
+        let (model, seen) = (model(), Seen::default());
+        seen.0.lock().unwrap().1 = 20.0;
+        let mut bench = bench(&model, &seen, |_| ());
+        bench.rest().unwrap();
+        bench.rest().unwrap();
+        // Nobody looked for half a minute.
+        seen.0.lock().unwrap().1 = 50.0;
+        bench.rest().unwrap();
+        bench.rest().unwrap();
+        let waited = seen.0.lock().unwrap().2.clone();
+        let expected = [20.0, 20.01, 20.02, 50.01];
+        assert_eq!(waited.len(), expected.len());
+        for (waited, expected) in waited.iter().zip(expected) {
+            assert!((waited - expected).abs() < 1e-9, "{waited} s, {expected} s");
+        }
+    }
+
+    #[test]
+    fn whatever_goes_wrong_the_robot_is_stopped() {
+        let model = model();
+        let ends = |spoil: fn(&mut Fake), most: f64, interrupted: bool| {
+            let seen = Seen::default();
+            let mut bench = bench(&model, &seen, spoil);
+            bench.most.fill(most);
+            bench.interrupted.store(interrupted, Ordering::SeqCst);
+            let failed = bench.drive(1.0, |_| Some(vec![0.0])).is_err();
+            drop(bench);
+            let asked = seen.0.lock().unwrap().0.clone();
+            (failed, asked)
+        };
+        let said = |failed, asked: &str| (failed, asked.to_owned());
+        assert_eq!(ends(|d| d.fails = true, 1.0, false), said(true, "rws"));
+        assert_eq!(ends(|d| d.measured = 2.0, 1.0, false), said(true, "rs"));
+        assert_eq!(
+            ends(|d| d.measured = f64::NAN, 1.0, false),
+            said(true, "rs")
+        );
+        assert_eq!(ends(|_| (), 1.0, true), said(true, "s"));
+        let stale = ends(|d| d.fresh = false, 1.0, false);
+        assert_eq!(stale, said(true, &("rw".repeat(20) + "rs")));
+        // Also where nothing did, and somebody left.
+        assert_eq!(
+            ends(|_| (), 1.0, false),
+            said(false, &("rw".repeat(100) + "s"))
+        );
     }
 }

@@ -1,6 +1,8 @@
 //! The person in front of the robot.
 
 use std::io::BufRead as _;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
 use std::time::Duration;
 
@@ -9,10 +11,16 @@ use crate::failure::Failure;
 use crate::output;
 
 /// Answers, line by line, from standard input.
-pub(super) struct Person(Receiver<String>);
+pub(super) struct Person {
+    answers: Receiver<String>,
+    interrupted: Arc<AtomicBool>,
+}
+
+/// How often it is looked whether somebody pressed Ctrl-C.
+const LOOK: Duration = Duration::from_millis(50);
 
 impl Person {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(interrupted: Arc<AtomicBool>) -> Self {
         let (say, hear) = channel();
         // It ends with the process, or when nobody listens any more.
         std::thread::spawn(move || {
@@ -23,17 +31,29 @@ impl Person {
                 }
             }
         });
-        Self(hear)
+        Self {
+            answers: hear,
+            interrupted,
+        }
     }
 
     fn gone() -> Failure {
         Failure::work("nobody answers: bring-up needs a person who looks at the robot")
     }
 
-    /// The answer to a question, before anything is driven.
+    /// The answer to a question, while nothing is driven.
     pub(super) fn answer(&self, question: &str) -> Result<String, Failure> {
         output::note(question);
-        self.0.recv().map_err(|_| Self::gone())
+        loop {
+            match self.answers.recv_timeout(LOOK) {
+                Ok(answer) => return Ok(answer),
+                Err(RecvTimeoutError::Disconnected) => return Err(Self::gone()),
+                Err(RecvTimeoutError::Timeout) if self.interrupted.load(Ordering::SeqCst) => {
+                    return Err(Failure::work("stopped by Ctrl-C"));
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+        }
     }
 
     /// The answer, while the robot is kept at 0.
@@ -45,15 +65,17 @@ impl Person {
         output::note(question);
         loop {
             bench.rest()?;
-            match self.0.try_recv() {
+            match self.answers.try_recv() {
                 Ok(answer) => return Ok(answer),
                 Err(TryRecvError::Disconnected) => return Err(Self::gone()),
                 // A simulated robot's clock does not wait for anybody.
-                Err(TryRecvError::Empty) => match self.0.recv_timeout(Duration::from_millis(1)) {
-                    Ok(answer) => return Ok(answer),
-                    Err(RecvTimeoutError::Timeout) => {}
-                    Err(RecvTimeoutError::Disconnected) => return Err(Self::gone()),
-                },
+                Err(TryRecvError::Empty) => {
+                    match self.answers.recv_timeout(Duration::from_millis(1)) {
+                        Ok(answer) => return Ok(answer),
+                        Err(RecvTimeoutError::Timeout) => {}
+                        Err(RecvTimeoutError::Disconnected) => return Err(Self::gone()),
+                    }
+                }
             }
         }
     }
