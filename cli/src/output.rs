@@ -87,10 +87,15 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
+/// From here on an error says that a model runs away, and no more.
+const ASTRAY: f64 = 100.0;
+
 /// Per cent with a sensible number of digits.
 pub(crate) fn percent(value: f64) -> String {
     if value.is_nan() {
         "-".to_owned()
+    } else if value > ASTRAY {
+        format!("> {:.0} %", 100.0 * ASTRAY)
     } else {
         format!("{:.2} %", 100.0 * value)
     }

@@ -31,11 +31,16 @@ pub(crate) fn show(value: f64, digits: usize) -> String {
     text.replace('-', "−")
 }
 
+/// From here on an error says that a model runs away, and no more.
+const ASTRAY: f64 = 100.0;
+
 /// A share as percent, with as many digits as mean something: `73 %`, `0.4 %`.
 pub(crate) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     if !percent.is_finite() {
         "–".into()
+    } else if share > ASTRAY {
+        format!(">\u{a0}{:.0}\u{a0}%", 100.0 * ASTRAY)
     } else if percent.abs() >= 9.95 || percent == 0.0 {
         format!("{percent:.0}\u{a0}%").replace('-', "−")
     } else if percent.abs() < 0.095 {
