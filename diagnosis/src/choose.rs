@@ -20,11 +20,13 @@ pub(crate) struct Chosen {
 }
 
 /// Puts the smallest explanation that is not significantly worse than the best one first, with
-/// those that cannot be told from it.
+/// those that cannot be told from it. One that has not `earned` its place on unseen data comes first
+/// only where none has.
 pub(crate) fn choose(
     explanations: &mut Vec<Explanation>,
     finalists: &[(Judged, Fit)],
     floor: f64,
+    earned: &dyn Fn(usize, &Explanation) -> bool,
 ) -> Option<Chosen> {
     finalists.first()?;
     let squared = |i: usize| nrmse(&finalists[i].0.rank).powi(2);
@@ -41,10 +43,20 @@ pub(crate) fn choose(
     let not_worse: Vec<usize> = (0..finalists.len())
         .filter(|i| same(*i, 0) || squared(*i) < allowed)
         .collect();
+    let firsts: Vec<usize> = not_worse
+        .iter()
+        .copied()
+        .filter(|i| earned(*i, &explanations[*i]))
+        .collect();
+    let firsts = if firsts.is_empty() {
+        &not_worse
+    } else {
+        &firsts
+    };
     let complexity = |i: usize| finalists[i].0.candidate.complexity();
     let error = |i: usize| nrmse(&finalists[i].0.rank);
-    let simplest = not_worse.iter().map(|i| complexity(*i)).min()?;
-    let simple = || not_worse.iter().filter(|i| complexity(**i) == simplest);
+    let simplest = firsts.iter().map(|i| complexity(*i)).min()?;
+    let simple = || firsts.iter().filter(|i| complexity(**i) == simplest);
     let leader = *simple().min_by(|a, b| error(**a).total_cmp(&error(**b)))?;
     // The common before the rare, and both wheels alike before one wheel: what is built alike fails
     // alike. But only where the errors do not tell them apart.

@@ -40,8 +40,8 @@ const SIBLINGS: usize = 2;
 const BEATS: f64 = 3.7;
 /// It must be so many standard errors from doing nothing.
 const SIGNIFICANT: f64 = 4.0;
-/// With so many it need not shine on unseen data, only not fail there: an effect that shows in
-/// transients alone leaves few samples to be judged by.
+/// With so many it need not shine on unseen data, only leave no more there than the plain model: an
+/// effect that shows in transients alone leaves few samples to be judged by.
 const CERTAIN: f64 = 5.0;
 /// What it explains must be so large beside the floor, as a share of it, to matter.
 const MATTERS: f64 = 0.2;
@@ -202,19 +202,22 @@ pub(crate) fn diagnose_above(
 
     let floor = floor(model, test.unwrap_or(runs));
     let mut explanations = explain(&finalists, &nominal_rank, &holdout);
-    let chosen = choose(&mut explanations, &finalists, floor);
+    let earned = |i: usize, explanation: &Explanation| {
+        let unseen = advantage(&nominal_losses, &finalists[i].0.losses);
+        unseen > BEATS || (unseen > 0.0 && explanation.significance > CERTAIN)
+    };
+    let chosen = choose(&mut explanations, &finalists, floor, &earned);
     let missing = chosen.and_then(|i| {
         let (judged, _) = &finalists[i.finalist];
         let of = |plain: &Losses, with: &Losses| {
             (nrmse(plain).powi(2) - nrmse(with).powi(2)).max(0.0).sqrt()
         };
         let explained = of(&nominal_rank, &judged.rank);
-        let unseen = advantage(&nominal_losses, &judged.losses);
         let significance = explanations[0].significance;
-        let earned = unseen > BEATS || (unseen > -SAME && significance > CERTAIN);
         // Down to the noise, or a good part of what there was to explain.
         let complete = nrmse(&judged.rank) < COMPLETE * floor && explained > MATTERS * floor;
         let matters = complete || explained > (MATTERS * floor).max(least);
+        let earned = earned(i.finalist, &explanations[0]);
         (earned && significance > SIGNIFICANT && matters && determined(&explanations[0]))
             .then(|| explanations[0].place.clone())
     });
