@@ -24,7 +24,8 @@ const HALF_WINDOW: usize = 3;
 
 /// All steps of `reference` that are at least half a second apart, with their responses.
 ///
-/// A step is a change between two samples of more than a tenth of the largest such change.
+/// A step is a change between two samples of more than a tenth of the largest such change, to a value
+/// that stays: a reference that wanders on by more than 2 % of it was no step.
 /// Overshoot and settling are those of the mean over seven samples.
 pub fn step_responses(time: &[f64], reference: &[f64], measured: &[f64]) -> Vec<StepResponse> {
     let n = time.len().min(reference.len()).min(measured.len());
@@ -44,6 +45,9 @@ pub fn step_responses(time: &[f64], reference: &[f64], measured: &[f64]) -> Vec<
         }
         let (from, to) = (reference[start - 1], reference[start]);
         let size = to - from;
+        if (start..end).any(|k| (reference[k] - to).abs() > 0.02 * size.abs()) {
+            continue;
+        }
         let smooth = |k: usize| {
             let first = k.saturating_sub(HALF_WINDOW).max(start);
             let last = (k + HALF_WINDOW + 1).min(end);
@@ -74,6 +78,16 @@ pub fn step_responses(time: &[f64], reference: &[f64], measured: &[f64]) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_smooth_reference_has_no_steps() {
+        let time: Vec<f64> = (0..3000).map(|k| 0.01 * f64::from(k)).collect();
+        let reference: Vec<f64> = time
+            .iter()
+            .map(|t| 0.06 * t.sin() + 0.06 * (2.7 * t + 0.1).sin())
+            .collect();
+        assert_eq!(step_responses(&time, &reference, &reference), []);
+    }
 
     /// The paper's loop: `1 - e^{-ωt}(1 - ωt)` overshoots by 13.5 % and settles at 0.607 s.
     #[test]
