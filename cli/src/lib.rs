@@ -23,6 +23,7 @@ use clap::Parser as _;
 use loopsight_controllers as _;
 use loopsight_drivers as _;
 use loopsight_estimators as _;
+use loopsight_onboard as _;
 use loopsight_plants as _;
 
 use arguments::{Arguments, Command};

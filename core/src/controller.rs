@@ -19,12 +19,18 @@ pub struct Command {
 pub enum ControlError {
     /// Slices of other lengths than those the controller was built for.
     Sizes,
+    /// What computes the commands elsewhere, aboard a robot, does not answer.
+    NoAnswer,
+    /// What computes the commands elsewhere has come to rest; its reason.
+    AtRest(&'static str),
 }
 
 impl fmt::Display for ControlError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             ControlError::Sizes => f.write_str("signals do not fit the controller's sizes"),
+            ControlError::NoAnswer => f.write_str("the robot does not answer"),
+            ControlError::AtRest(why) => write!(f, "the robot has come to rest: {why}"),
         }
     }
 }

@@ -16,10 +16,12 @@
 //!
 //! On a host the same [`Session`] is the twin that a firmware is held against, digit for digit.
 
-#![cfg_attr(not(test), no_std)]
+#![cfg_attr(not(feature = "std"), no_std)]
 
 mod effects;
 mod efforts;
+#[cfg(feature = "std")]
+mod host;
 mod learner;
 mod model;
 mod port;
@@ -29,6 +31,10 @@ mod watch;
 
 pub use effects::effect;
 pub use efforts::Efforts;
+#[cfg(all(feature = "std", unix))]
+pub use host::Line;
+#[cfg(feature = "std")]
+pub use host::{Aboard, SafetySettings};
 pub use learner::Learner;
 pub use model::Model;
 pub use port::{Port, Prompted};

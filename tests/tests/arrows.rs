@@ -37,6 +37,7 @@ const ARROWS: [(&str, &[&str]); 13] = [
             "estimators",
             "controllers",
             "drivers",
+            "onboard",
             "recordings",
             "diagnosis",
             "report",

@@ -109,6 +109,32 @@ enum Demand {
 }
 
 impl FeedbackLinearizingPiSettings {
+    /// Gains `(K_p, K_i)` of `n` controlled states, for who runs the law elsewhere; an error where the
+    /// table asks for a constant acceleration or a feedforward.
+    pub fn gains(&self, n: usize) -> Result<Vec<(f64, f64)>, BuildError> {
+        let only = "this runs the law from gains alone";
+        if self.feedforward {
+            return Err(
+                BuildError::at("feedforward", "`feedforward` is true, expected false").help(only),
+            );
+        }
+        match self.demand(Some(n))? {
+            Demand::Gains(gains) => Ok(gains),
+            Demand::Acceleration(_) => {
+                let key = "open_loop_acceleration";
+                Err(BuildError::at(key, format!("`{key}` is given, expected gains")).help(only))
+            }
+        }
+    }
+
+    /// Largest commands of `n` inputs, in their unit; infinite where none is given.
+    pub fn limits(&self, n: usize) -> Result<Vec<f64>, BuildError> {
+        match &self.limit {
+            None => Ok(vec![f64::INFINITY; n]),
+            Some(limit) => Ok(limit.expand("limit", n)?.as_slice().to_vec()),
+        }
+    }
+
     /// What is asked for, of `n` channels; with `n` unknown, as many as the longest list has.
     fn demand(&self, n: Option<usize>) -> Result<Demand, BuildError> {
         let of_gains = [

@@ -133,7 +133,7 @@ impl LearningSettings {
     }
 
     /// When the `row`-th regression of `model` is learned from.
-    pub(super) fn guards(&self, model: &Model, row: usize, period: f64) -> Guards {
+    pub fn guards(&self, model: &Model, row: usize, period: f64) -> Guards {
         let signal = &model.plant.states[model.plant.controlled[row]];
         let of = |map: &BTreeMap<String, f64>| map.get(signal.id).copied();
         Guards {
