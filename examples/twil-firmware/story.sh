@@ -6,6 +6,7 @@ cd "$(dirname "$0")"
 loopsight=${LOOPSIGHT:-loopsight}
 line=/tmp/twil.line
 
+rm -f "$line"
 qemu-system-arm -machine mps2-an386 -cpu cortex-m4 -display none -monitor none \
     -serial "unix:$line,server=on,wait=on" -kernel "$LOOPSIGHT_FIRMWARE" &
 board=$!

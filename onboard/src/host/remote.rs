@@ -138,11 +138,17 @@ impl Controller<f64> for Remote {
 }
 
 impl Drop for Remote {
-    /// The robot is let go at the end of a run; one that does not hear it stops by its watchdog.
+    /// The robot is let go at the end of a run, and the line stays open until it has said so; one that does
+    /// not hear it stops by its watchdog.
     fn drop(&mut self) {
-        if self.tick.is_some() {
-            let session = self.session;
-            let _ = self.line.say(&Request::Stop { session });
+        let session = self.session;
+        if self.tick.is_none() || self.line.say(&Request::Stop { session }).is_err() {
+            return;
+        }
+        while let Ok(reply) = self.line.hear() {
+            if matches!(reply, Reply::Stopped { .. }) {
+                break;
+            }
         }
     }
 }
