@@ -13,6 +13,17 @@ pub struct Innovation<S> {
     pub accepted: bool,
 }
 
+impl<S: Real> Innovation<S> {
+    /// That of a sample that was not used.
+    pub fn refused() -> Self {
+        Self {
+            innovation: S::of(f64::NAN),
+            relative_variance: S::of(f64::NAN),
+            accepted: false,
+        }
+    }
+}
+
 /// Recursive estimation of `y = phi . theta` from one scalar measurement at a time.
 ///
 /// Implementations allocate nothing in [`Estimator::update`].

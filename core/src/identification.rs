@@ -220,17 +220,7 @@ impl Observer<f64> for Identification {
 
     /// Also of a tick that taught nothing, as long as there was a prediction.
     fn innovation(&self, row: usize) -> Option<Innovation<f64>> {
-        let lesson = self.rows.get(row)?.lesson;
-        let learned = lesson.withheld.is_none();
-        lesson.innovation.is_finite().then_some(Innovation {
-            innovation: lesson.innovation,
-            relative_variance: if learned {
-                lesson.relative_variance
-            } else {
-                1.0
-            },
-            accepted: learned,
-        })
+        self.rows.get(row)?.lesson.innovation()
     }
 
     fn residual(&self, row: usize, values: &[f64]) -> Option<f64> {

@@ -9,7 +9,7 @@ use core::fmt;
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
 
-use crate::{Command, Estimator, Real, Sample};
+use crate::{Command, Estimator, Innovation, Real, Sample};
 use excitation::Information;
 use projection::into_box;
 pub use range::Range;
@@ -98,6 +98,20 @@ impl<S: Real> Lesson<S> {
             withheld: Some(why),
             projected: false,
         }
+    }
+
+    /// As an innovation; `None` where there was no prediction.
+    pub fn innovation(&self) -> Option<Innovation<S>> {
+        let accepted = self.withheld.is_none();
+        self.innovation.is_finite().then_some(Innovation {
+            innovation: self.innovation,
+            relative_variance: if accepted {
+                self.relative_variance
+            } else {
+                S::one()
+            },
+            accepted,
+        })
     }
 }
 

@@ -4,7 +4,7 @@ use loopsight_core::{Estimator, Innovation, Real};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
 
-use crate::factor::Factor;
+use crate::estimate::{Estimate, is_start};
 
 mod settings;
 pub use settings::{KalmanError, KalmanSettings};
@@ -59,14 +59,8 @@ pub struct Kalman<S: Real, D: Dim>
 where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
-    theta: OVector<S, D>,
-    next: OVector<S, D>,
-    /// What [`Estimator::covariance`] shows.
-    p: OMatrix<S, D, D>,
-    factor: Factor<S, D>,
+    estimate: Estimate<S, D>,
     drift: S,
-    initial: S,
-    cap: S,
 }
 
 impl<S: Real, D: Dim> Kalman<S, D>
@@ -75,28 +69,14 @@ where
 {
     /// An estimator that starts from `theta`.
     pub fn new(theta: OVector<S, D>, settings: &KalmanSettings) -> Result<Self, KalmanError> {
-        if theta.is_empty() || theta.iter().any(|v| !v.is_finite()) {
+        if !is_start(theta.as_slice()) {
             return Err(KalmanError::Theta);
         }
         let limit = settings.check::<S>(theta.len())?;
-        let (dim, _) = theta.shape_generic();
-        let factor = Factor::new(dim);
-        let mut kalman = Self {
-            next: theta.clone(),
-            p: OMatrix::zeros_generic(dim, dim),
+        Ok(Self {
+            estimate: Estimate::new(theta, settings.initial_covariance, limit),
             drift: S::of(settings.drift),
-            initial: S::of(settings.initial_covariance),
-            cap: factor.shown_below(S::of(limit)),
-            factor,
-            theta,
-        };
-        kalman.restart();
-        Ok(kalman)
-    }
-
-    fn restart(&mut self) {
-        self.factor.restart(self.initial.smaller(self.cap));
-        self.factor.show(self.p.as_mut_slice());
+        })
     }
 }
 
@@ -107,41 +87,30 @@ where
     OMatrix<S, D, D>: Send,
 {
     fn update(&mut self, regressor: &[S], measurement: S) -> Innovation<S> {
-        let n = self.theta.len();
-        let refused = Innovation {
-            innovation: S::of(f64::NAN),
-            relative_variance: S::of(f64::NAN),
-            accepted: false,
-        };
+        let n = self.theta().len();
+        let estimate = &mut self.estimate;
         // Before anything grows: NaN and infinity anywhere in the sample end up in one of these.
-        if regressor.len() != n || !self.factor.spread(regressor).is_finite() {
-            return refused;
+        if regressor.len() != n {
+            return Innovation::refused();
         }
-        let mut innovation = measurement;
-        for (phi, theta) in regressor.iter().zip(self.theta.iter()) {
-            innovation -= *phi * *theta;
-        }
-        if !innovation.is_finite() {
-            return refused;
+        let mut spread = estimate.factor.spread(regressor);
+        let innovation = estimate.error(regressor, measurement);
+        if !(spread.is_finite() && innovation.is_finite()) {
+            return Innovation::refused();
         }
         if self.drift > S::zero() {
             for i in 0..n {
                 let unit = |k| if k == i { S::one() } else { S::zero() };
-                self.factor.add(self.drift, unit);
+                estimate.factor.add(self.drift, unit);
             }
-            self.factor.bound(self.cap);
+            estimate.bound();
+            spread = estimate.factor.spread(regressor);
         }
-        let spread = self.factor.spread(regressor);
-        let step = innovation / (S::one() + spread);
-        for (i, next) in self.next.iter_mut().enumerate() {
-            *next = self.theta[i] + self.factor.gain(i) * step;
+        if !(spread.is_finite() && estimate.advance(innovation / (S::one() + spread))) {
+            return Innovation::refused();
         }
-        if !(spread.is_finite() && self.next.iter().all(|v| v.is_finite())) {
-            return refused;
-        }
-        self.theta.copy_from(&self.next);
-        self.factor.absorb(S::one(), S::one());
-        self.factor.show(self.p.as_mut_slice());
+        estimate.factor.absorb(S::one(), S::one());
+        estimate.show();
         Innovation {
             innovation,
             relative_variance: S::one() + spread,
@@ -150,24 +119,21 @@ where
     }
 
     fn theta(&self) -> &[S] {
-        self.theta.as_slice()
+        self.estimate.theta()
     }
 
     fn covariance(&self) -> &[S] {
-        self.p.as_slice()
+        self.estimate.covariance()
     }
 
     fn set_theta(&mut self, theta: &[S]) {
-        if theta.len() == self.theta.len() && theta.iter().all(|v| v.is_finite()) {
-            self.theta.as_mut_slice().copy_from_slice(theta);
-        }
+        self.estimate.set_theta(theta);
     }
 
     /// Nothing changes when `theta` has another length or is not finite.
     fn reset(&mut self, theta: &[S]) {
-        if theta.len() == self.theta.len() && theta.iter().all(|v| v.is_finite()) {
-            self.set_theta(theta);
-            self.restart();
+        if self.estimate.set_theta(theta) {
+            self.estimate.restart();
         }
     }
 }

@@ -6,6 +6,7 @@
 
 #![cfg_attr(not(feature = "std"), no_std)]
 
+mod estimate;
 mod factor;
 mod kalman;
 mod lms;

@@ -4,6 +4,8 @@ use loopsight_core::{Estimator, Innovation, Real};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
 
+use crate::estimate::{error, is_start, set};
+
 mod settings;
 pub use settings::{LmsError, LmsSettings};
 
@@ -66,7 +68,7 @@ where
     /// An estimator that starts from `theta`.
     pub fn new(theta: OVector<S, D>, settings: &LmsSettings) -> Result<Self, LmsError> {
         settings.check()?;
-        if theta.is_empty() || theta.iter().any(|v| !v.is_finite()) {
+        if !is_start(theta.as_slice()) {
             return Err(LmsError::Theta);
         }
         let (dim, _) = theta.shape_generic();
@@ -89,33 +91,25 @@ where
     OMatrix<S, D, D>: Send,
 {
     fn update(&mut self, regressor: &[S], measurement: S) -> Innovation<S> {
-        let mut told = Innovation {
-            innovation: S::of(f64::NAN),
-            relative_variance: S::of(f64::NAN),
-            accepted: false,
-        };
         if regressor.len() != self.theta.len() {
-            return told;
+            return Innovation::refused();
         }
-        let mut innovation = measurement;
-        let mut power = self.regularization;
-        for (phi, theta) in regressor.iter().zip(self.theta.iter()) {
-            innovation -= *phi * *theta;
-            power += *phi * *phi;
-        }
+        let innovation = error(self.theta.as_slice(), regressor, measurement);
+        let power = (regressor.iter()).fold(self.regularization, |sum, phi| sum + *phi * *phi);
         let gain = self.step * innovation / power;
         for (i, next) in self.next.iter_mut().enumerate() {
             let theta = self.theta[i];
             *next = theta + gain * regressor[i] + self.leakage * (self.start[i] - theta);
         }
         if !(power.is_finite() && self.next.iter().all(|v| v.is_finite())) {
-            return told;
+            return Innovation::refused();
         }
         self.theta.copy_from(&self.next);
-        told.innovation = innovation;
-        told.relative_variance = S::one();
-        told.accepted = true;
-        told
+        Innovation {
+            innovation,
+            relative_variance: S::one(),
+            accepted: true,
+        }
     }
 
     fn theta(&self) -> &[S] {
@@ -127,9 +121,7 @@ where
     }
 
     fn set_theta(&mut self, theta: &[S]) {
-        if theta.len() == self.theta.len() && theta.iter().all(|v| v.is_finite()) {
-            self.theta.as_mut_slice().copy_from_slice(theta);
-        }
+        set(self.theta.as_mut_slice(), theta);
     }
 
     fn reset(&mut self, theta: &[S]) {

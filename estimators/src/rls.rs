@@ -4,7 +4,7 @@ use loopsight_core::{Estimator, Innovation, Real};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
 
-use crate::factor::Factor;
+use crate::estimate::{Estimate, is_start};
 
 mod forgetting;
 mod settings;
@@ -90,16 +90,9 @@ pub struct Rls<S: Real, D: Dim>
 where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
-    theta: OVector<S, D>,
-    next: OVector<S, D>,
-    /// What [`Estimator::covariance`] shows.
-    p: OMatrix<S, D, D>,
-    factor: Factor<S, D>,
+    estimate: Estimate<S, D>,
     rule: Forgetting,
     memory: Memory<S>,
-    initial: S,
-    /// `p_max`, less what rounding may add to a diagonal entry.
-    cap: S,
 }
 
 impl<S: Real, D: Dim> Rls<S, D>
@@ -108,43 +101,28 @@ where
 {
     /// An estimator that starts from `theta`.
     pub fn new(theta: OVector<S, D>, settings: &RlsSettings) -> Result<Self, RlsError> {
-        if theta.is_empty() || theta.iter().any(|v| !v.is_finite()) {
+        if !is_start(theta.as_slice()) {
             return Err(RlsError::Theta);
         }
         let (limit, least) = settings.check::<S>(theta.len())?;
-        let (dim, _) = theta.shape_generic();
-        let factor = Factor::new(dim);
-        let mut rls = Self {
-            next: theta.clone(),
-            p: OMatrix::zeros_generic(dim, dim),
-            cap: factor.shown_below(S::of(limit)),
-            factor,
+        Ok(Self {
+            estimate: Estimate::new(theta, settings.initial_covariance, limit),
             rule: settings.rule,
             memory: Memory::new(settings.forgetting, least),
-            initial: S::of(settings.initial_covariance),
-            theta,
-        };
-        rls.restart();
-        Ok(rls)
-    }
-
-    fn restart(&mut self) {
-        self.factor.restart(self.initial.smaller(self.cap));
-        self.factor.show(self.p.as_mut_slice());
-        self.memory.clear();
+        })
     }
 
     /// Forgets along `regressor`, and returns `φᵀPφ` after that.
     fn forget_along(&mut self, regressor: &[S], spread: S) -> S {
         let lambda = self.memory.constant();
-        let known = self.factor.known(regressor);
+        let known = self.estimate.factor.known(regressor);
         let growth = (S::one() - lambda) / (lambda * known);
         if !(spread > S::zero() && growth.is_finite()) {
             return spread;
         }
-        self.factor.add(growth, |i| regressor[i]);
-        self.factor.bound(self.cap);
-        self.factor.spread(regressor)
+        self.estimate.factor.add(growth, |i| regressor[i]);
+        self.estimate.bound();
+        self.estimate.factor.spread(regressor)
     }
 }
 
@@ -155,23 +133,14 @@ where
     OMatrix<S, D, D>: Send,
 {
     fn update(&mut self, regressor: &[S], measurement: S) -> Innovation<S> {
-        let n = self.theta.len();
-        let refused = Innovation {
-            innovation: S::of(f64::NAN),
-            relative_variance: S::of(f64::NAN),
-            accepted: false,
-        };
-        if regressor.len() != n {
-            return refused;
+        if regressor.len() != self.theta().len() {
+            return Innovation::refused();
         }
-        let mut innovation = measurement;
-        for (phi, theta) in regressor.iter().zip(self.theta.iter()) {
-            innovation -= *phi * *theta;
-        }
-        let predicted = self.factor.spread(regressor);
+        let innovation = self.estimate.error(regressor, measurement);
+        let predicted = self.estimate.factor.spread(regressor);
         // NaN and infinity anywhere in the sample end up in one of these two.
         if !(innovation.is_finite() && predicted.is_finite()) {
-            return refused;
+            return Innovation::refused();
         }
         let square = innovation * innovation / (S::one() + predicted);
         let (lambda, spread) = match self.rule {
@@ -179,19 +148,14 @@ where
             Forgetting::Variable => (self.memory.variable(square), predicted),
             Forgetting::Directional => (S::one(), self.forget_along(regressor, predicted)),
         };
-        let step = innovation / (lambda + spread);
-        for (i, next) in self.next.iter_mut().enumerate() {
-            *next = self.theta[i] + self.factor.gain(i) * step;
+        if !self.estimate.advance(innovation / (lambda + spread)) {
+            return Innovation::refused();
         }
-        if self.next.iter().any(|v| !v.is_finite()) {
-            return refused;
-        }
-        self.theta.copy_from(&self.next);
-        self.factor.absorb(lambda, S::one() / lambda);
+        self.estimate.factor.absorb(lambda, S::one() / lambda);
         if lambda < S::one() {
-            self.factor.bound(self.cap);
+            self.estimate.bound();
         }
-        self.factor.show(self.p.as_mut_slice());
+        self.estimate.show();
         if self.rule == Forgetting::Variable {
             self.memory.remember(square);
         }
@@ -203,24 +167,22 @@ where
     }
 
     fn theta(&self) -> &[S] {
-        self.theta.as_slice()
+        self.estimate.theta()
     }
 
     fn covariance(&self) -> &[S] {
-        self.p.as_slice()
+        self.estimate.covariance()
     }
 
     fn set_theta(&mut self, theta: &[S]) {
-        if theta.len() == self.theta.len() && theta.iter().all(|v| v.is_finite()) {
-            self.theta.as_mut_slice().copy_from_slice(theta);
-        }
+        self.estimate.set_theta(theta);
     }
 
     /// Nothing changes when `theta` has another length or is not finite.
     fn reset(&mut self, theta: &[S]) {
-        if theta.len() == self.theta.len() && theta.iter().all(|v| v.is_finite()) {
-            self.set_theta(theta);
-            self.restart();
+        if self.estimate.set_theta(theta) {
+            self.estimate.restart();
+            self.memory.clear();
         }
     }
 }

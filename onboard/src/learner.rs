@@ -293,17 +293,7 @@ where
     }
 
     fn innovation(&self, row: usize) -> Option<Innovation<S>> {
-        let lesson = self.rows.get(row)?.lesson;
-        let learned = lesson.withheld.is_none();
-        lesson.innovation.is_finite().then_some(Innovation {
-            innovation: lesson.innovation,
-            relative_variance: if learned {
-                lesson.relative_variance
-            } else {
-                S::one()
-            },
-            accepted: learned,
-        })
+        self.rows.get(row)?.lesson.innovation()
     }
 
     fn restart(&mut self, values: &[S]) {

@@ -4,6 +4,7 @@ use core::fmt;
 
 use loopsight_core::Real;
 
+use crate::estimate::NO_START;
 use crate::factor::LEAST;
 
 /// What the TOML table of `kalman` holds.
@@ -82,9 +83,7 @@ impl KalmanError {
 impl fmt::Display for KalmanError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            KalmanError::Theta => {
-                f.write_str("the start value is empty or not finite, expected finite numbers")
-            }
+            KalmanError::Theta => f.write_str(NO_START),
             KalmanError::InitialCovariance(found) => write!(
                 f,
                 "`initial_covariance` is {found}, expected a number above 0"
@@ -111,6 +110,7 @@ mod part {
 
     use super::KalmanSettings;
     use crate::Kalman;
+    use crate::estimate::declared::{COVARIANCE_LIMIT, INITIAL_COVARIANCE};
 
     const META: PartMeta = PartMeta {
         id: "kalman",
@@ -121,23 +121,13 @@ mod part {
                     Bierman (1977), Factorization Methods for Discrete Sequential Estimation, ch. V",
         example: "[estimator.kalman]\ninitial_covariance = 100.0\ndrift = 1e-3\n",
         settings: &[
-            Setting::new(
-                "initial_covariance",
-                "1",
-                "the covariance starts as this multiple of the identity (scaled parameters squared \
-                 over measurement unit squared); default 1e6",
-            ),
+            INITIAL_COVARIANCE,
             Setting::new(
                 "drift",
                 "1",
                 "q: growth of the covariance in a sample, at least 0; default 1e-3",
             ),
-            Setting::new(
-                "covariance_limit",
-                "1",
-                "greatest diagonal entry of the covariance, for times without excitation; \
-                 default: the initial covariance",
-            ),
+            COVARIANCE_LIMIT,
         ],
     };
 

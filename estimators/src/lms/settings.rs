@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::estimate::NO_START;
+
 /// What the TOML table of `lms` holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
@@ -73,9 +75,7 @@ impl LmsError {
 impl fmt::Display for LmsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            LmsError::Theta => {
-                f.write_str("the start value is empty or not finite, expected finite numbers")
-            }
+            LmsError::Theta => f.write_str(NO_START),
             LmsError::Step(found) => write!(
                 f,
                 "`step` is {found}, expected a number above 0 and below 2"

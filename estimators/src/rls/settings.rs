@@ -4,6 +4,7 @@ use core::fmt;
 
 use loopsight_core::Real;
 
+use crate::estimate::NO_START;
 use crate::factor::LEAST;
 
 /// What is forgotten; see [`crate::Rls`].
@@ -125,9 +126,7 @@ impl RlsError {
 impl fmt::Display for RlsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            RlsError::Theta => {
-                f.write_str("the start value is empty or not finite, expected finite numbers")
-            }
+            RlsError::Theta => f.write_str(NO_START),
             RlsError::Forgetting(found) => write!(
                 f,
                 "`forgetting` is {found}, expected a number above 0 and up to 1"
@@ -162,6 +161,7 @@ mod part {
 
     use super::RlsSettings;
     use crate::Rls;
+    use crate::estimate::declared::{COVARIANCE_LIMIT, INITIAL_COVARIANCE};
 
     const META: PartMeta = PartMeta {
         id: "rls",
@@ -192,18 +192,8 @@ mod part {
                 "least weight of the rule \"variable\", above 0 and up to `forgetting`; default: its \
                  tenth power",
             ),
-            Setting::new(
-                "initial_covariance",
-                "1",
-                "the covariance starts as this multiple of the identity (scaled parameters squared \
-                 over measurement unit squared); default 1e6",
-            ),
-            Setting::new(
-                "covariance_limit",
-                "1",
-                "greatest diagonal entry of the covariance, for times without excitation; \
-                 default: the initial covariance",
-            ),
+            INITIAL_COVARIANCE,
+            COVARIANCE_LIMIT,
         ],
     };
 

@@ -106,11 +106,7 @@ impl Estimator<f64> for Filter {
         let n = self.theta.len();
         let finite = measurement.is_finite() && regressor.iter().all(|r| r.is_finite());
         if regressor.len() != n || !finite {
-            return Innovation {
-                innovation: f64::NAN,
-                relative_variance: f64::NAN,
-                accepted: false,
-            };
+            return Innovation::refused();
         }
         for i in 0..n {
             let own = &mut self.covariance[i * n + i];

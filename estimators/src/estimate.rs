@@ -1,0 +1,133 @@
+//! An estimate with its covariance.
+
+use loopsight_core::Real;
+use nalgebra::allocator::Allocator;
+use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
+
+use crate::factor::Factor;
+
+/// An estimate, its covariance, and where both begin: what `rls` and `kalman` have in common.
+#[derive(Clone, Debug)]
+pub(crate) struct Estimate<S: Real, D: Dim>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
+    theta: OVector<S, D>,
+    next: OVector<S, D>,
+    /// What [`Estimate::covariance`] shows.
+    p: OMatrix<S, D, D>,
+    pub(crate) factor: Factor<S, D>,
+    initial: S,
+    /// Greatest diagonal entry of `P`, less what rounding may add to it.
+    cap: S,
+}
+
+impl<S: Real, D: Dim> Estimate<S, D>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
+    /// `theta` with the covariance `initial I`, no diagonal entry of which may exceed `limit`.
+    pub(crate) fn new(theta: OVector<S, D>, initial: f64, limit: f64) -> Self {
+        let (dim, _) = theta.shape_generic();
+        let factor = Factor::new(dim);
+        let mut estimate = Self {
+            next: theta.clone(),
+            p: OMatrix::zeros_generic(dim, dim),
+            cap: factor.shown_below(S::of(limit)),
+            factor,
+            initial: S::of(initial),
+            theta,
+        };
+        estimate.restart();
+        estimate
+    }
+
+    /// The covariance as in the beginning.
+    pub(crate) fn restart(&mut self) {
+        self.factor.restart(self.initial.smaller(self.cap));
+        self.show();
+    }
+
+    /// `y - φᵀθ`.
+    pub(crate) fn error(&self, regressor: &[S], measurement: S) -> S {
+        error(self.theta.as_slice(), regressor, measurement)
+    }
+
+    /// Holds the diagonal of `P` at its limit.
+    pub(crate) fn bound(&mut self) {
+        self.factor.bound(self.cap);
+    }
+
+    /// `θ <- θ + P φ step`, for the `φ` of [`Factor::spread`]; false, and nothing moved, where that
+    /// leaves the finite numbers.
+    pub(crate) fn advance(&mut self, step: S) -> bool {
+        for (i, next) in self.next.iter_mut().enumerate() {
+            *next = self.theta[i] + self.factor.gain(i) * step;
+        }
+        let finite = self.next.iter().all(|v| v.is_finite());
+        if finite {
+            self.theta.copy_from(&self.next);
+        }
+        finite
+    }
+
+    /// Brings what [`Estimate::covariance`] shows up to date.
+    pub(crate) fn show(&mut self) {
+        self.factor.show(self.p.as_mut_slice());
+    }
+
+    pub(crate) fn theta(&self) -> &[S] {
+        self.theta.as_slice()
+    }
+
+    pub(crate) fn covariance(&self) -> &[S] {
+        self.p.as_slice()
+    }
+
+    /// As [`set`].
+    pub(crate) fn set_theta(&mut self, theta: &[S]) -> bool {
+        set(self.theta.as_mut_slice(), theta)
+    }
+}
+
+/// `y - φᵀθ`.
+pub(crate) fn error<S: Real>(theta: &[S], regressor: &[S], measurement: S) -> S {
+    let products = regressor.iter().zip(theta);
+    products.fold(measurement, |left, (phi, theta)| left - *phi * *theta)
+}
+
+/// Whether an estimate may start from `theta`: finite numbers, at least one.
+pub(crate) fn is_start<S: Real>(theta: &[S]) -> bool {
+    !theta.is_empty() && theta.iter().all(|v| v.is_finite())
+}
+
+/// What to say where [`is_start`] does not hold.
+pub(crate) const NO_START: &str = "the start value is empty or not finite, expected finite numbers";
+
+/// Moves `theta` to `to`; false, and nothing moved, where `to` has another length or is not finite.
+pub(crate) fn set<S: Real>(theta: &mut [S], to: &[S]) -> bool {
+    let fits = to.len() == theta.len() && to.iter().all(|v| v.is_finite());
+    if fits {
+        theta.copy_from_slice(to);
+    }
+    fits
+}
+
+/// The settings of an estimate with its covariance, as `rls` and `kalman` declare them.
+#[cfg(feature = "std")]
+pub(crate) mod declared {
+    use loopsight_core::registry::Setting;
+
+    pub(crate) const INITIAL_COVARIANCE: Setting = Setting::new(
+        "initial_covariance",
+        "1",
+        "the covariance starts as this multiple of the identity (scaled parameters squared over \
+         measurement unit squared); default 1e6",
+    );
+    pub(crate) const COVARIANCE_LIMIT: Setting = Setting::new(
+        "covariance_limit",
+        "1",
+        "greatest diagonal entry of the covariance, for times without excitation; default: the \
+         initial covariance",
+    );
+}
