@@ -4,6 +4,7 @@ use loopsight_core::{AffineModel, Command, ControlError, Controller, Real, Tick}
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
 
+use crate::clipped::Clipped;
 use crate::{SampledPi, solve};
 
 mod design_error;
@@ -82,12 +83,10 @@ where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
     law: Law<S, D>,
-    limit: OVector<S, D>,
+    inputs: Clipped<S, D>,
     period: S,
     /// Where the rate of the reference is fed forward, the last reference; NaN at the start.
     forward: Option<OVector<S, D>>,
-    /// The last command that could be computed; zero at the start.
-    safe: OVector<S, D>,
     demand: OVector<S, D>,
     middle: OVector<S, D>,
     aim: OVector<S, D>,
@@ -182,10 +181,9 @@ where
         let zero = OVector::<S, D>::zeros_generic(dim, one);
         Ok(Self {
             law,
-            limit: limit.map(S::of),
+            inputs: Clipped::within(limit.map(S::of)),
             period: S::of(period),
             forward: None,
-            safe: zero.clone(),
             demand: zero.clone(),
             middle: zero.clone(),
             aim: zero.clone(),
@@ -200,7 +198,7 @@ where
     /// The same, with the rate of the reference fed forward.
     #[must_use]
     pub fn feeding_forward(mut self) -> Self {
-        let (dim, one) = self.limit.shape_generic();
+        let (dim, one) = self.demand.shape_generic();
         self.forward = Some(OVector::from_element_generic(dim, one, S::of(f64::NAN)));
         self
     }
@@ -208,14 +206,6 @@ where
     /// The acceleration asked for at the last step, one per controlled state.
     pub fn acceleration(&self) -> &[S] {
         self.demand.as_slice()
-    }
-
-    fn hold(&self, command: &mut [S]) -> Command {
-        command.copy_from_slice(self.safe.as_slice());
-        Command {
-            saturated: false,
-            held: true,
-        }
     }
 }
 
@@ -233,12 +223,12 @@ where
         model: &mut dyn AffineModel<S>,
         command: &mut [S],
     ) -> Result<Command, ControlError> {
-        let n = self.limit.len();
+        let n = self.inputs.len();
         if [reference.len(), measured.len(), command.len(), model.size()] != [n; 4] {
             return Err(ControlError::Sizes);
         }
         if reference.iter().chain(measured).any(|v| !v.is_finite()) {
-            return Ok(self.hold(command));
+            return Ok(self.inputs.hold(command));
         }
         let half = self.period * S::of(0.5);
         for i in 0..n {
@@ -285,14 +275,10 @@ where
         )
         .is_err()
         {
-            return Ok(self.hold(command));
+            return Ok(self.inputs.hold(command));
         }
         let mut saturated = !model.invert(self.middle.as_slice(), command);
-        for (value, limit) in command.iter_mut().zip(self.limit.iter()) {
-            saturated |= value.abs() > *limit;
-            *value = value.held(-*limit, *limit);
-        }
-        self.safe.as_mut_slice().copy_from_slice(command);
+        saturated |= self.inputs.clip(command);
         if let Law::Pi {
             proportional,
             integral,
@@ -342,7 +328,7 @@ where
         if let Some(before) = &mut self.forward {
             before.fill(S::of(f64::NAN));
         }
-        self.safe.fill(S::zero());
+        self.inputs.reset();
         self.demand.fill(S::zero());
     }
 }

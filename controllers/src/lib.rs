@@ -8,6 +8,7 @@
 
 #[cfg(feature = "std")]
 mod at_rest;
+mod clipped;
 mod feedback_linearizing_pi;
 mod mixing;
 mod mrac;

@@ -5,6 +5,7 @@ use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
 
 use crate::Mixing;
+use crate::clipped::Clipped;
 
 #[cfg(feature = "std")]
 mod settings;
@@ -63,13 +64,12 @@ where
     leak: S,
     size: OVector<S, D>,
     mixing: Mixing<S, D>,
-    limit: OVector<S, D>,
+    inputs: Clipped<S, D>,
     start: [OVector<S, D>; 3],
     theta: [OVector<S, D>; 3],
     model: OVector<S, D>,
     started: bool,
     demand: OVector<S, D>,
-    safe: OVector<S, D>,
 }
 
 /// The design of [`Mrac`]; lists hold one number per controlled state.
@@ -123,13 +123,12 @@ where
             step: zero.clone(),
             leak: S::of((design.leakage * period).min(1.0)),
             size: design.size.map(S::of),
-            limit: limit.map(S::of),
+            inputs: Clipped::within(limit.map(S::of)),
             start: [zero.clone(), zero.clone(), zero.clone()],
             theta: [zero.clone(), zero.clone(), zero.clone()],
             model: zero.clone(),
             started: false,
-            demand: zero.clone(),
-            safe: zero,
+            demand: zero,
             mixing,
         };
         for i in 0..limit.len() {
@@ -167,16 +166,12 @@ where
         _model: &mut dyn AffineModel<S>,
         command: &mut [S],
     ) -> Result<Command, ControlError> {
-        let n = self.limit.len();
+        let n = self.inputs.len();
         if [reference.len(), measured.len(), command.len()] != [n; 3] {
             return Err(ControlError::Sizes);
         }
         if reference.iter().chain(measured).any(|v| !v.is_finite()) {
-            command.copy_from_slice(self.safe.as_slice());
-            return Ok(Command {
-                saturated: false,
-                held: true,
-            });
+            return Ok(self.inputs.hold(command));
         }
         if !self.started {
             self.model.as_mut_slice().copy_from_slice(measured);
@@ -187,12 +182,7 @@ where
             self.demand[i] = (0..3).fold(S::zero(), |sum, j| sum + self.theta[j][i] * phi[j]);
         }
         self.mixing.mix(self.demand.as_slice(), command);
-        let mut saturated = false;
-        for (value, limit) in command.iter_mut().zip(self.limit.iter()) {
-            saturated |= value.abs() > *limit;
-            *value = value.held(-*limit, *limit);
-        }
-        self.safe.as_mut_slice().copy_from_slice(command);
+        let saturated = self.inputs.clip(command);
         for i in 0..n {
             let (r, y) = (reference[i], measured[i]);
             let mut error = y - self.model[i];
@@ -222,7 +212,7 @@ where
     fn reset(&mut self) {
         self.theta = self.start.clone();
         self.started = false;
-        self.safe.fill(S::zero());
+        self.inputs.reset();
     }
 }
 

@@ -5,6 +5,7 @@ use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
 
 use crate::Mixing;
+use crate::clipped::Clipped;
 
 #[cfg(feature = "std")]
 mod settings;
@@ -48,7 +49,7 @@ where
 {
     gains: PidGains<S, D>,
     mixing: Mixing<S, D>,
-    limit: OVector<S, D>,
+    inputs: Clipped<S, D>,
     period: S,
     integral: OVector<S, D>,
     derivative: OVector<S, D>,
@@ -56,7 +57,6 @@ where
     before: OVector<S, D>,
     demand: OVector<S, D>,
     achieved: OVector<S, D>,
-    safe: OVector<S, D>,
 }
 
 /// The numbers of [`Pid`], one of each per controlled state.
@@ -121,14 +121,13 @@ where
         Some(Self {
             gains,
             mixing,
-            limit: limit.clone(),
+            inputs: Clipped::within(limit.clone()),
             period: S::of(period),
             integral: zero.clone(),
             derivative: zero.clone(),
             before: OVector::from_element_generic(dim, one, S::of(f64::NAN)),
             demand: zero.clone(),
-            achieved: zero.clone(),
-            safe: zero,
+            achieved: zero,
         })
     }
 }
@@ -147,16 +146,12 @@ where
         _model: &mut dyn AffineModel<S>,
         command: &mut [S],
     ) -> Result<Command, ControlError> {
-        let n = self.limit.len();
+        let n = self.inputs.len();
         if [reference.len(), measured.len(), command.len()] != [n; 3] {
             return Err(ControlError::Sizes);
         }
         if reference.iter().chain(measured).any(|v| !v.is_finite()) {
-            command.copy_from_slice(self.safe.as_slice());
-            return Ok(Command {
-                saturated: false,
-                held: true,
-            });
+            return Ok(self.inputs.hold(command));
         }
         let (gains, period) = (&self.gains, self.period);
         for i in 0..n {
@@ -173,12 +168,7 @@ where
             self.demand[i] = proportional + self.integral[i] + self.derivative[i];
         }
         self.mixing.mix(self.demand.as_slice(), command);
-        let mut saturated = false;
-        for (value, limit) in command.iter_mut().zip(self.limit.iter()) {
-            saturated |= value.abs() > *limit;
-            *value = value.held(-*limit, *limit);
-        }
-        self.safe.as_mut_slice().copy_from_slice(command);
+        let saturated = self.inputs.clip(command);
         self.achieved.copy_from(&self.demand);
         if saturated {
             self.mixing.unmix(command, self.achieved.as_mut_slice());
@@ -202,7 +192,7 @@ where
         self.integral.fill(S::zero());
         self.derivative.fill(S::zero());
         self.before.fill(S::of(f64::NAN));
-        self.safe.fill(S::zero());
+        self.inputs.reset();
     }
 }
 
