@@ -4,6 +4,7 @@ use std::io::Write as _;
 
 use loopsight_diagnosis::{Comparison, Estimate, Fit, Held, ResidualForce, Statement, Verdict};
 use loopsight_recordings::{Fault, Severity};
+use loopsight_report::ASTRAY;
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -86,9 +87,6 @@ pub(crate) fn number(value: f64) -> String {
         text
     }
 }
-
-/// From here on an error says that a model runs away, and no more.
-const ASTRAY: f64 = 100.0;
 
 /// Per cent with a sensible number of digits.
 pub(crate) fn percent(value: f64) -> String {

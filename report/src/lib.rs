@@ -43,6 +43,7 @@ pub use diagnosis::diagnosis_page;
 pub use figure::{Figure, FigurePanel, FigureTrace, Style, figure_svg};
 pub use fit::fit_page;
 pub use improvement::improvement_page;
+pub use numbers::ASTRAY;
 pub use page::Context;
 pub use record::{
     ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace, Timing,

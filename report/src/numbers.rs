@@ -32,7 +32,7 @@ pub(crate) fn show(value: f64, digits: usize) -> String {
 }
 
 /// From here on an error says that a model runs away, and no more.
-const ASTRAY: f64 = 100.0;
+pub const ASTRAY: f64 = 100.0;
 
 /// A share as percent, with as many digits as mean something: `73 %`, `0.4 %`.
 pub(crate) fn percent(share: f64) -> String {
