@@ -6,13 +6,11 @@
 )]
 
 use allocation_counter::measure;
-use loopsight_core::config::Source;
 use loopsight_core::learning::Withheld;
-use loopsight_core::loop_file::{Composed, LoopFile};
+use loopsight_core::loop_file::Composed;
 use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, DriverContext};
-use loopsight_core::run::Run;
-use loopsight_tests::Random;
+use loopsight_tests::loops::{self, GAINS, velocity_loop};
+use loopsight_tests::{PERIOD, Random};
 use rayon::prelude::*;
 
 // The registry is empty unless the crates are linked.
@@ -21,7 +19,6 @@ use loopsight_drivers as _;
 use loopsight_estimators as _;
 use loopsight_plants as _;
 
-const PERIOD: f64 = 0.01;
 const ESTIMATORS: [&str; 5] = [
     "[estimator.rls]\nforgetting = 0.998\ninitial_covariance = 1e3",
     "[estimator.rls]\nforgetting = 0.998\nrule = \"variable\"\ninitial_covariance = 1e3",
@@ -41,30 +38,13 @@ fn plant(k: [f64; 6]) -> String {
 
 fn composed(model: &str, robot: &str, rest: &str) -> (Model, Composed) {
     let model = Model::from_toml("model.toml", model).unwrap().0;
-    let text = format!(
-        "model = \"model.toml\"\nperiod_s = {PERIOD}\n\
-         [controller.feedback_linearizing_pi]\nsettling_time_s = 0.45\nlimit = 12.0\n{rest}\n"
-    );
-    let source = Source::parse("loop.toml", &text).unwrap();
-    let file = LoopFile::parse(&source).unwrap();
-    let load_model = |_: &str| -> Result<Model, BuildError> {
-        Ok(Model::from_toml("robot.toml", robot).unwrap().0)
-    };
-    let load_runs = |_: &str, _: &Model| -> Result<Vec<Run>, BuildError> { Ok(Vec::new()) };
-    let context = DriverContext {
-        model: &model,
-        period: PERIOD,
-        load_model: &load_model,
-        load_runs: &load_runs,
-        read_column: &|path, _| Err(BuildError::at("path", format!("no {path}"))),
-    };
-    let composed = file.compose(&source, &model, &context).unwrap();
+    let composed = velocity_loop(rest, &model, robot);
     (model, composed)
 }
 
 /// From -1 to 1.
 fn next(random: &mut Random) -> f64 {
-    (random.bits() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    2.0 * random.share() - 1.0
 }
 
 /// Ticks on, and calls `each` with the squares of the tracking errors.
@@ -91,15 +71,7 @@ struct Outcome {
 
 fn one(index: usize) -> Outcome {
     let mut random = Random::new(index as u64 + 1);
-    let range = [
-        (-30.0, -5.0),
-        (0.0, 0.05),
-        (0.08, 0.3),
-        (-30.0, -5.0),
-        (-4.0, 0.0),
-        (0.3, 0.8),
-    ];
-    let truth = range.map(|(low, high)| low + 0.5 * (high - low) * (1.0 + next(&mut random)));
+    let truth = GAINS.map(|(low, high)| low + 0.5 * (high - low) * (1.0 + next(&mut random)));
     let guess = truth.map(|k| k * (1.0 + 0.6 * next(&mut random)));
     let estimator = ESTIMATORS[index % ESTIMATORS.len()];
     // Within what 12 V can do with the weakest motor that the guess may stand for.
@@ -294,21 +266,7 @@ fn mistake(learning: &str) -> String {
         "model = \"model.toml\"\nperiod_s = 0.01\n[driver.simulated]\n\
          [controller.feedback_linearizing_pi]\nsettling_time_s = 0.45\n[learning]\n{learning}\n"
     );
-    let source = Source::parse("loop.toml", &text).unwrap();
-    let load_model = |_: &str| -> Result<Model, BuildError> { unreachable!() };
-    let load_runs = |_: &str, _: &Model| -> Result<Vec<Run>, BuildError> { Ok(Vec::new()) };
-    let context = DriverContext {
-        model: &model,
-        period: PERIOD,
-        load_model: &load_model,
-        load_runs: &load_runs,
-        read_column: &|path, _| Err(BuildError::at("path", format!("no {path}"))),
-    };
-    let file = match LoopFile::parse(&source) {
-        Ok(file) => file,
-        Err(error) => return error.to_string(),
-    };
-    file.compose(&source, &model, &context)
+    loops::composed(&text, &model, &plant(TWIL))
         .err()
         .unwrap()
         .to_string()

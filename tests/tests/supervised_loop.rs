@@ -8,13 +8,11 @@
 
 use allocation_counter::measure;
 use loopsight_core::TickError;
-use loopsight_core::config::Source;
-use loopsight_core::loop_file::{Composed, LoopFile};
+use loopsight_core::loop_file::Composed;
 use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, DriverContext};
-use loopsight_core::run::Run;
 use loopsight_core::supervisor::Action;
-use loopsight_tests::Random;
+use loopsight_tests::loops::{GAINS, velocity_loop};
+use loopsight_tests::{PERIOD, Random};
 use rayon::prelude::*;
 
 // The registry is empty unless the crates are linked.
@@ -23,7 +21,6 @@ use loopsight_drivers as _;
 use loopsight_estimators as _;
 use loopsight_plants as _;
 
-const PERIOD: f64 = 0.01;
 const TICKS: u64 = 2000;
 const HALF_TRACK: f64 = 0.131;
 
@@ -40,45 +37,15 @@ fn plant([a, b, c, d, e, f]: [f64; 6]) -> String {
 
 fn composed(model: &str, robot: &str, rest: &str) -> Composed {
     let model = Model::from_toml("model.toml", model).unwrap().0;
-    let text = format!(
-        "model = \"model.toml\"\nperiod_s = {PERIOD}\n\
-         [controller.feedback_linearizing_pi]\nsettling_time_s = 0.45\nlimit = 12.0\n{rest}\n"
-    );
-    let source = Source::parse("loop.toml", &text).unwrap();
-    let file = LoopFile::parse(&source).unwrap();
-    let load_model = |_: &str| -> Result<Model, BuildError> {
-        Ok(Model::from_toml("robot.toml", robot).unwrap().0)
-    };
-    let load_runs = |_: &str, _: &Model| -> Result<Vec<Run>, BuildError> { Ok(Vec::new()) };
-    let context = DriverContext {
-        model: &model,
-        period: PERIOD,
-        load_model: &load_model,
-        load_runs: &load_runs,
-        read_column: &|path, _| Err(BuildError::at("path", format!("no {path}"))),
-    };
-    file.compose(&source, &model, &context).unwrap()
-}
-
-/// From 0 to 1.
-fn share(random: &mut Random) -> f64 {
-    (random.bits() >> 11) as f64 / (1u64 << 53) as f64
+    velocity_loop(rest, &model, robot)
 }
 
 /// A robot, a guess up to 60 % off, and a loop that learns under a supervisor. Returns the speeds that
 /// no voltage can take it beyond, too.
 fn supervised(index: usize, fault: &str) -> (Composed, [f64; 2]) {
     let mut random = Random::new(index as u64 + 1);
-    let range = [
-        (-30.0, -5.0),
-        (0.0, 0.05),
-        (0.08, 0.3),
-        (-30.0, -5.0),
-        (-4.0, 0.0),
-        (0.3, 0.8),
-    ];
-    let truth = range.map(|(low, high)| low + (high - low) * share(&mut random));
-    let guess = truth.map(|k| k * (0.4 + 1.2 * share(&mut random)));
+    let truth = GAINS.map(|(low, high)| low + (high - low) * random.share());
+    let guess = truth.map(|k| k * (0.4 + 1.2 * random.share()));
     // What 24 V can do; a part of it is asked for.
     let most = [24.0 * truth[2] / -truth[0], 24.0 * truth[5] / -truth[3]];
     let [reach, turn] = [0.3 * most[0], 0.2 * most[1]];
