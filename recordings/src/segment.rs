@@ -12,7 +12,8 @@ pub(crate) const GAP_TIME: f64 = 0.5;
 pub(crate) struct Segments {
     /// Rows to keep, part by part.
     pub(crate) parts: Vec<Vec<usize>>,
-    /// Rows that repeat the time stamp before.
+    /// Rows that repeat the time stamp before, or differ from it by less than a time since the
+    /// part's beginning can tell.
     pub(crate) duplicates: Vec<usize>,
     /// Rows whose time stamp lies before the one before.
     pub(crate) backwards: Vec<usize>,
@@ -38,11 +39,13 @@ pub(crate) fn segment(times: &[(usize, f64)]) -> Segments {
     let gap = GAP_TIME.max(GAP_PERIODS * period);
     let mut out = Segments::default();
     let mut part: Vec<usize> = Vec::new();
-    let mut last = f64::NEG_INFINITY;
+    let (mut origin, mut last) = (f64::NAN, f64::NAN);
     for &(row, time) in times {
         let step = time - last;
-        if !part.is_empty() {
-            if step == 0.0 {
+        if part.is_empty() {
+            origin = time;
+        } else {
+            if step >= 0.0 && time - origin == last - origin {
                 out.duplicates.push(row);
                 continue;
             }
@@ -58,6 +61,7 @@ pub(crate) fn segment(times: &[(usize, f64)]) -> Segments {
                     out.gaps.push((row, step));
                 }
                 out.parts.push(std::mem::take(&mut part));
+                origin = time;
             }
         }
         part.push(row);
@@ -97,6 +101,15 @@ mod tests {
         assert_eq!((out.duplicates, out.backwards), (vec![5], vec![10]));
         assert_eq!(out.parts.len(), 1);
         assert_eq!(out.parts[0].len(), 18);
+    }
+
+    #[test]
+    fn stamps_that_are_one_once_the_first_is_subtracted_are_duplicates() {
+        let out = of(&[0.0, -3e-81, -8e-213, -0.0, 0.1, 0.2]);
+        assert_eq!(out.restarts, [] as [usize; 0]);
+        let out = of(&[0.0, 1e-156, -3e-81, -8e-213, -0.0]);
+        assert_eq!((out.restarts, out.duplicates), (vec![2], vec![4]));
+        assert_eq!(out.parts, [vec![0, 1], vec![2, 3]]);
     }
 
     #[test]
