@@ -164,6 +164,14 @@ impl<S: Real, C: Controller<S>> Controller<S> for Trajectory<S, C> {
         }
     }
 
+    fn estimates(&self) -> &[S] {
+        self.velocity.estimates()
+    }
+
+    fn remark(&self) -> Option<&str> {
+        self.velocity.remark()
+    }
+
     fn reset(&mut self) {
         self.pose = self.start;
         self.before = None;

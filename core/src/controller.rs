@@ -103,6 +103,14 @@ pub trait Controller<S: Real>: Send {
     fn demand(&self, reference: &mut [S]) {
         let _ = reference;
     }
+    /// Values of what the controller learned itself, where it does: for logs.
+    fn estimates(&self) -> &[S] {
+        &[]
+    }
+    /// What there is to say of the last step beyond its result: why it failed, what happened meanwhile.
+    fn remark(&self) -> Option<&str> {
+        None
+    }
     /// Forgets integrators and the last command.
     fn reset(&mut self);
 }
@@ -121,6 +129,12 @@ impl<S: Real, C: Controller<S> + ?Sized> Controller<S> for Box<C> {
     }
     fn demand(&self, reference: &mut [S]) {
         (**self).demand(reference);
+    }
+    fn estimates(&self) -> &[S] {
+        (**self).estimates()
+    }
+    fn remark(&self) -> Option<&str> {
+        (**self).remark()
     }
     fn reset(&mut self) {
         (**self).reset();

@@ -10,8 +10,8 @@ use crate::identification::{Identification, IdentificationError, LearningSetting
 use crate::limits::{self, LimitSettings};
 use crate::model::{Affine, Model, Treatment};
 use crate::registry::{
-    BuildError, ControllerPart, DriverContext, DriverPart, EstimatorPart, HostDriver,
-    HostDriverError,
+    BuildError, ControllerPart, DriverContext, DriverPart, Estimated, EstimatorPart, HalfError,
+    HostDriver, HostDriverError,
 };
 use crate::regression::Scheme;
 use crate::supervisor::{Supervisor, SupervisorSettings};
@@ -86,6 +86,8 @@ pub struct Composed {
     target: Vec<f64>,
     /// What the controller says of its design.
     pub notes: Vec<String>,
+    /// What the controller learns itself.
+    pub estimated: Vec<Estimated>,
 }
 
 impl Composed {
@@ -171,16 +173,14 @@ impl LoopFile {
         let signals: Vec<Signal> = controlled.iter().map(|s| **s).collect();
         let references = excitation::build_with(&self.reference, &signals, context.read_column)
             .map_err(|e| placed(source, &["reference".into()], e))?;
-        let controller_id = self.controller.meta().id;
-        let controller = self
-            .controller
-            .build(model, self.period_s)
-            .map_err(|e| placed(source, &["controller".into(), controller_id.into()], e))?;
-        let driver_id = self.driver.meta().id;
-        let driver = self
-            .driver
-            .build(context)
-            .map_err(|e| placed(source, &["driver".into(), driver_id.into()], e))?;
+        let halves = self.driver.build_with(self.controller.as_ref(), context);
+        let (driver, controller) = halves.map_err(|error| {
+            let (table, id, error) = match error {
+                HalfError::Driver(error) => ("driver", self.driver.meta().id, error),
+                HalfError::Controller(error) => ("controller", self.controller.meta().id, error),
+            };
+            placed(source, &[table.into(), id.into()], error)
+        })?;
         let identification = match &self.estimator {
             None if self.learning.is_some() => {
                 let message = "`learning` says what is done with an estimator, and there is none";
@@ -217,6 +217,11 @@ impl LoopFile {
         let (input_limits, reference_limits) =
             limits::build(&self.limits, model.plant.inputs, &signals)
                 .map_err(|e| placed(source, &["limits".into()], e))?;
+        if self.driver.runs_law() && input_limits.is_some() {
+            let message = "the robot runs its law itself, and nothing here can hold its inputs";
+            let help = "give the law its `limit` instead".to_owned();
+            return Err(source.error(&["limits".into()], message, Some(help)));
+        }
         let rows = identification.as_ref().map_or(0, Identification::len);
         let supervisor = match &self.supervisor {
             None => None,
@@ -226,7 +231,9 @@ impl LoopFile {
                     .map_err(|e| placed(source, &["supervisor".into()], e))?,
             ),
         };
-        let clock: Box<dyn Clock> = if self.driver.is_simulated() && !self.real_time {
+        // A simulation is as fast as it can be; a robot's own timer is waited for where it is read.
+        let hurries = self.driver.is_simulated() && !self.real_time;
+        let clock: Box<dyn Clock> = if hurries || self.driver.runs_law() {
             Box::new(SimulatedClock::default())
         } else {
             Box::new(SystemClock::default())
@@ -255,6 +262,7 @@ impl LoopFile {
             controlled,
             references,
             notes,
+            estimated: self.controller.estimated(model),
         })
     }
 }

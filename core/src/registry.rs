@@ -6,6 +6,7 @@
 //! crate that is only a dependency is not linked, so whoever wants its parts says
 //! `use loopsight_plants as _;`.
 
+use std::any::Any;
 use std::fmt::Debug;
 
 use crate::config::{Mistake, Step};
@@ -228,15 +229,31 @@ pub trait EstimatorPart: Debug + Send + Sync {
     fn build(&self, theta: &[f64]) -> Result<Box<dyn Estimator<f64>>, BuildError>;
 }
 
+/// A parameter that a controller estimates itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimated {
+    /// Its name.
+    pub name: String,
+    /// Its SI unit.
+    pub unit: &'static str,
+    /// The value it starts from.
+    pub start: f64,
+}
+
 /// A controller as it stands in a file: `[controller.<id>]`.
 #[typetag::serde]
-pub trait ControllerPart: Debug + Send + Sync {
+pub trait ControllerPart: Debug + Send + Sync + Any {
     /// The declaration.
     fn meta(&self) -> &'static PartMeta;
     /// Builds it for a model and a period (s).
     fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError>;
     /// Plain statements about what was asked for and what the design will give, for reports.
     fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+    /// What [`Controller::estimates`] has values of.
+    fn estimated(&self, model: &Model) -> Vec<Estimated> {
+        let _ = model;
         Vec::new()
     }
     /// True where the controller inverts the model it is given, so that effects in the model file
@@ -289,6 +306,18 @@ pub struct DriverContext<'a> {
     pub read_column: &'a crate::excitation::ReadColumn<'a>,
 }
 
+/// A loop's driver and controller, or which of the two cannot be built.
+pub type Halves = Result<(HostDriver, Box<dyn Controller<f64>>), HalfError>;
+
+/// The half of a loop that cannot be built.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HalfError {
+    /// The driver's table.
+    Driver(BuildError),
+    /// The controller's table.
+    Controller(BuildError),
+}
+
 /// A driver as it stands in a file: `[driver.<id>]`.
 #[typetag::serde]
 pub trait DriverPart: Debug + Send + Sync {
@@ -298,6 +327,19 @@ pub trait DriverPart: Debug + Send + Sync {
     fn build(&self, context: &DriverContext<'_>) -> Result<HostDriver, BuildError>;
     /// True when the driver's time is simulated: the loop then runs as fast as it can.
     fn is_simulated(&self) -> bool;
+    /// True where the robot runs the loop's law itself, by a timer of its own: its readings keep the time, and
+    /// [`DriverPart::build_with`] makes the controller.
+    fn runs_law(&self) -> bool {
+        false
+    }
+    /// Builds it, and the controller of the same loop: each by itself, where they need not know of each
+    /// other.
+    fn build_with(&self, controller: &dyn ControllerPart, context: &DriverContext<'_>) -> Halves {
+        let controller = controller
+            .build(context.model, context.period)
+            .map_err(HalfError::Controller)?;
+        Ok((self.build(context).map_err(HalfError::Driver)?, controller))
+    }
 }
 
 /// Registers a plant; made by [`declare_plant!`](crate::declare_plant).

@@ -15,12 +15,16 @@
 //! Hello { version, session }      ──►
 //!                                 ◄──     Hello { version, session, period_us, name }
 //! Configure { session, .. }       ──►
-//!                                 ◄──     Configured { session }  or  Refused { reason }
+//!                                 ◄──     Configured { session }  or  Stopped { reason }
 //! Step { session, tick, .. }      ──►                                             once per period
 //!                                 ◄──     Act { session, tick, .. }
 //! Stop { session }                ──►
 //!                                 ◄──     Stopped { session, tick, reason }
 //! ```
+//!
+//! A robot without sensors is measured by its host, and answers each step. A robot with motors and encoders
+//! of its own ticks by its own timer from the first step on: steps, without a measurement, tell it the
+//! reference and that its host is there; each of its ticks is said by an Act, with what was measured.
 //!
 //! The host draws a session's number at random. What carries another one than that of the last
 //! greeting is answered with a stop: so each side notices when the other was started anew. [`Hello`] is
@@ -43,8 +47,8 @@ pub use configuration::{
     SIGNALS, Safety,
 };
 pub use frame::{Decoder, FrameError, LONGEST, MESSAGE, encode};
-pub use message::{Act, Hello, Measured, Note, Reply, Request, Signals, Values, Welcome};
+pub use message::{Act, Hello, Measured, Note, Reply, Request, Sensed, Signals, Values, Welcome};
 pub use reason::{Reason, Unusable};
 
 /// Version of the messages. Either side refuses another one.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;

@@ -67,9 +67,21 @@ pub struct Measured {
     pub age_us: u32,
     /// Voltage of the supply, V.
     pub supply: f32,
-    /// What was measured: the controlled states first.
+    /// What was measured: the controlled states first. Empty for a robot with sensors of its own, which
+    /// ticks by its own timer and takes the reference only.
     pub measured: Signals,
     /// Where the controlled states should be now.
+    pub reference: Signals,
+}
+
+/// What a robot with sensors of its own began a tick with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sensed {
+    /// Voltage of the supply, V.
+    pub supply: f32,
+    /// What it measured: the controlled states.
+    pub measured: Signals,
+    /// Where they should have been: the last reference that it heard.
     pub reference: Signals,
 }
 
@@ -92,6 +104,8 @@ pub struct Act {
     pub learned: u8,
     /// Cost of the tick before in the robot's own unit (its README says which); 0 where not known.
     pub cost: u32,
+    /// What the tick began with, where the robot measured it itself.
+    pub sensed: Option<Sensed>,
 }
 
 /// What a robot says.
@@ -104,7 +118,7 @@ pub enum Reply {
         /// Number of the session.
         session: u32,
     },
-    /// Answer to a step.
+    /// Answer to a step; of a robot with sensors of its own, what it did in a period.
     Act(Act),
     /// The robot is at rest, and why.
     Stopped {

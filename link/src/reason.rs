@@ -44,6 +44,12 @@ pub enum Reason {
     },
     /// The configuration cannot be used.
     Configuration(Unusable),
+    /// A step without a measurement, and this robot has no sensors of its own.
+    NoSensors,
+    /// A step with a measurement, and this robot measures itself.
+    OwnSensors,
+    /// The robot's own motors or encoders failed.
+    Hardware,
 }
 
 /// What is wrong with a configuration.
@@ -83,6 +89,9 @@ impl Reason {
             Reason::NotFinite => "not_finite",
             Reason::SupplyLow => "supply_low",
             Reason::NoCommand => "no_command",
+            Reason::NoSensors => "no_sensors",
+            Reason::OwnSensors => "own_sensors",
+            Reason::Hardware => "hardware",
             Reason::Version { .. } => "version",
             Reason::Configuration(_) => "configuration",
         }
@@ -111,6 +120,15 @@ impl fmt::Display for Reason {
             Reason::NotFinite => f.write_str("a measurement or a reference is no number"),
             Reason::SupplyLow => f.write_str("the supply is below its least voltage"),
             Reason::NoCommand => f.write_str("the control law had no command"),
+            Reason::NoSensors => f.write_str(
+                "the host measured nothing, and this robot has no sensors of its own: drive it with \
+                 `[controller.aboard]` and another driver than `serial`",
+            ),
+            Reason::OwnSensors => f.write_str(
+                "the host handed a measurement over, and this robot measures itself: drive it with \
+                 `[driver.serial]`",
+            ),
+            Reason::Hardware => f.write_str("the robot's own motors or encoders failed"),
             Reason::Version { expected, found } => write!(
                 f,
                 "the host speaks version {found} of the protocol, expected {expected}"

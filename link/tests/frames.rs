@@ -78,7 +78,7 @@ fn requests() -> [Request; 4] {
     ]
 }
 
-fn replies() -> [Reply; 4] {
+fn replies() -> [Reply; 5] {
     let session = 7;
     [
         Reply::Hello(Welcome {
@@ -98,6 +98,22 @@ fn replies() -> [Reply; 4] {
             held: false,
             learned: 0b11,
             cost: 512,
+            sensed: None,
+        }),
+        Reply::Act(Act {
+            session,
+            tick: 4712,
+            command: signals(&[12.0, -3.25]),
+            parameters: (0..8).map(|i| i as f32 * 0.1).collect(),
+            saturated: false,
+            held: false,
+            learned: 0,
+            cost: 512,
+            sensed: Some(Sensed {
+                supply: 11.9,
+                measured: signals(&[0.1, -0.7]),
+                reference: signals(&[0.0, 1.3]),
+            }),
         }),
         Reply::Stopped {
             session,

@@ -1,33 +1,40 @@
 //! `[controller.aboard]`: the host's end of the line.
 
 mod configured;
-#[cfg(unix)]
+mod conversation;
 mod line;
+mod open;
 mod remote;
+mod serial;
 
 use loopsight_controllers::FeedbackLinearizingPiSettings;
 use loopsight_core::identification::LearningSettings;
 use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, ControllerPart, PartMeta, Setting};
+use loopsight_core::registry::{BuildError, ControllerPart, Estimated, PartMeta, Setting};
 use loopsight_core::{Controller, declare_part};
 use loopsight_estimators::RlsSettings;
 use loopsight_link::Safety;
 use serde::{Deserialize, Serialize};
 
-#[cfg(unix)]
-pub use line::Line;
+use conversation::Conversation;
+pub use line::{Line, LineError};
+pub use serial::Serial;
 
-/// A law that runs aboard a robot: the loop on the host hands over what was measured and wanted, and
-/// the robot answers with the command.
+/// A law that runs aboard a robot, told to it once before its first step: model, effects, learning and law of
+/// this table.
 ///
-/// Model, effects, learning and law of this table are sent to the robot once, before its first step. Which
-/// robot stands behind the line is the loop's driver: with `simulated` the plant is on the host, and the
-/// firmware drives it like the real one.
+/// With `[driver.serial]` the robot measures and drives by itself, and the line stands in that table. With any
+/// other driver the host hands over what was measured and wanted, step by step, and the robot at `line` answers
+/// with the command: with `simulated` the plant is on the host, and the firmware drives it like the real one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Aboard {
-    /// Path of the unix socket at which the line is found.
-    pub socket: String,
+    /// Serial port or unix socket at which the robot is found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub line: Option<String>,
+    /// Baud rate of a serial port, 1/s.
+    #[serde(default = "baud")]
+    pub baud: u32,
     /// How long the robot may take to answer, s.
     #[serde(default = "timeout")]
     pub timeout_s: f64,
@@ -48,6 +55,28 @@ fn timeout() -> f64 {
     2.0
 }
 
+fn baud() -> u32 {
+    115_200
+}
+
+/// Checks the time that an answer may take.
+fn waits(timeout_s: f64) -> Result<(), BuildError> {
+    if timeout_s > 0.0 && timeout_s < 1e6 {
+        return Ok(());
+    }
+    let message = format!("`timeout_s` is {timeout_s} s, expected a number above 0 s");
+    Err(BuildError::at("timeout_s", message))
+}
+
+/// Checks a baud rate.
+fn rate(baud: u32) -> Result<(), BuildError> {
+    if baud > 0 {
+        return Ok(());
+    }
+    let error = BuildError::at("baud", "`baud` is 0, expected a number above 0");
+    Err(error.help("the rate the robot's firmware has, often 115200"))
+}
+
 /// `[controller.aboard.safety]`: when a robot comes to rest by itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -58,6 +87,8 @@ pub struct SafetySettings {
     pub encoder_s: f64,
     /// Input from which on every motor turns, in the unit of the inputs.
     pub encoder_input: f64,
+    /// Least supply, V, of a robot that measures it: with `[driver.serial]`.
+    pub least_supply_v: f64,
 }
 
 impl Default for SafetySettings {
@@ -67,6 +98,7 @@ impl Default for SafetySettings {
             watchdog_s: 0.1,
             encoder_s: 0.5,
             encoder_input: 4.0,
+            least_supply_v: 0.0,
         }
     }
 }
@@ -89,13 +121,18 @@ impl SafetySettings {
             let message = format!("`encoder_input` is {found}, expected a number above 0");
             return Err(BuildError::at("safety.encoder_input", message));
         }
+        if !(self.least_supply_v >= 0.0 && self.least_supply_v.is_finite()) {
+            let found = self.least_supply_v;
+            let message =
+                format!("`least_supply_v` is {found}, expected a number from 0 V upwards");
+            return Err(BuildError::at("safety.least_supply_v", message));
+        }
         Ok(Safety {
             watchdog_ticks: ticks("watchdog_s", self.watchdog_s)?,
-            // A host that hands a measurement over has just taken it.
+            // Who hands a measurement over, host or the robot's own sensors, has just taken it.
             stale_us: (period * 0.5e6) as u32,
             stale_ticks: 1,
-            // Nor does it know the supply.
-            least_supply: 0.0,
+            least_supply: self.least_supply_v as f32,
             encoder_ticks: ticks("encoder_s", self.encoder_s)?,
             encoder_input: self.encoder_input as f32,
         })
@@ -106,17 +143,18 @@ const META: PartMeta = PartMeta {
     id: "aboard",
     role: "controller",
     summary: "the law and the learning run aboard a robot, at the other end of a line; the host hands over \
-              what was measured and wanted",
+              what is wanted and, where the robot has no sensors of its own, what was measured",
     equation: "robot: V = G⁻¹ (ν - f) with friction compensated, guarded recursive least squares; host: \
                step out, command in",
     reference: "Alves, Lages, Henriques (2018), IFAC PapersOnLine 51-15, 437-442, equations (38)-(52)",
-    example: "[controller.aboard]\nsocket = \"/tmp/twil.line\"\nlaw = { settling_time_s = 0.45, limit = 12.0 }\n",
+    example: "[controller.aboard]\nline = \"/tmp/twil.line\"\nlaw = { settling_time_s = 0.45, limit = 12.0 }\n",
     settings: &[
         Setting::new(
-            "socket",
+            "line",
             "",
-            "path of the unix socket at which the line is found",
+            "serial port or unix socket at which the robot is found; not with `[driver.serial]`, which has it",
         ),
+        Setting::new("baud", "1/s", "baud rate of a serial port; default: 115200"),
         Setting::new(
             "timeout_s",
             "s",
@@ -142,7 +180,8 @@ const META: PartMeta = PartMeta {
             "safety",
             "",
             "table: when the robot comes to rest by itself: `watchdog_s` without a step (default 0.1 s), \
-             `encoder_s` of an input beyond `encoder_input` that turns nothing (default 0.5 s, 4)",
+             `encoder_s` of an input beyond `encoder_input` that turns nothing (default 0.5 s, 4); with \
+             `[driver.serial]` a supply below `least_supply_v` (default 0 V)",
         ),
     ],
 };
@@ -154,39 +193,62 @@ impl ControllerPart for Aboard {
     }
 
     fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError> {
-        if !(self.timeout_s > 0.0 && self.timeout_s < 1e6) {
-            let found = self.timeout_s;
-            let message = format!("`timeout_s` is {found} s, expected a number above 0 s");
-            return Err(BuildError::at("timeout_s", message));
+        let Some(line) = &self.line else {
+            let error = BuildError::at("", "at which line is the robot?");
+            return Err(error.help(
+                "say `line = \"/dev/ttyACM0\"`, or take `[driver.serial]` for a robot with sensors of its own",
+            ));
+        };
+        waits(self.timeout_s)?;
+        rate(self.baud)?;
+        if self.safety.least_supply_v > 0.0 {
+            let message = "no supply is measured where the host measures for the robot";
+            return Err(BuildError::at("safety.least_supply_v", message));
         }
         let configuration = self.configuration(model, period)?;
-        #[cfg(unix)]
-        return Ok(Box::new(remote::Remote::new(
-            Line::at(&self.socket, self.timeout_s),
-            configuration,
-            period,
-        )));
-        #[cfg(not(unix))]
-        {
-            let _ = configuration;
-            Err(BuildError::at("socket", "this system has no unix sockets"))
-        }
+        let line = Line::at(line, self.baud, self.timeout_s);
+        let robot = Conversation::new(line, configuration, period);
+        Ok(Box::new(remote::Remote::new(robot, self.learned(model))))
     }
 
     fn notes(&self) -> Vec<String> {
+        let at = self
+            .line
+            .as_ref()
+            .map_or_else(String::new, |l| format!(" at {l}"));
+        let runs = if self.rls.is_some() {
+            " and the learning run"
+        } else {
+            " runs"
+        };
         vec![format!(
-            "the law{} aboard the robot at {}, in single precision",
-            if self.rls.is_some() {
-                " and the learning run"
-            } else {
-                " runs"
-            },
-            self.socket
+            "the law{runs} aboard the robot{at}, in single precision"
         )]
+    }
+
+    fn estimated(&self, model: &Model) -> Vec<Estimated> {
+        let values = model.lower::<f64>(&model.values());
+        let of = |i: usize| Estimated {
+            name: model.plant.parameters[i].id.to_owned(),
+            unit: model.plant.parameters[i].unit,
+            start: values[i],
+        };
+        self.learned(model).into_iter().map(of).collect()
     }
 
     fn ideal(&self, references: &[Vec<f64>], period: f64) -> Option<Vec<Vec<f64>>> {
         self.law.ideal(references, period)
+    }
+}
+
+impl Aboard {
+    /// Parameters of the plant's equations that are learned aboard, by index: those that enter linearly and
+    /// that the file does not hold.
+    fn learned(&self, model: &Model) -> Vec<usize> {
+        let held = |id: &str| model.parameters.iter().any(|p| p.name == id && !p.free);
+        let parameters = model.plant.parameters.iter().enumerate();
+        let learned = parameters.filter(|(_, p)| self.rls.is_some() && p.linear && !held(p.id));
+        learned.map(|(i, _)| i).collect()
     }
 }
 

@@ -11,6 +11,7 @@
 //! ```text
 //! bytes from the line ──► Session::take ──► replies, to the line
 //! once per period     ──► Session::elapsed          the watchdog
+//!                      or Session::sensed           the watchdog and a tick, with sensors of the board's own
 //! Session::output     ──► motors; none: at rest
 //! ```
 //!
@@ -31,15 +32,13 @@ mod watch;
 
 pub use effects::effect;
 pub use efforts::Efforts;
-#[cfg(all(feature = "std", unix))]
-pub use host::Line;
 #[cfg(feature = "std")]
-pub use host::{Aboard, SafetySettings};
+pub use host::{Aboard, Line, LineError, SafetySettings, Serial};
 pub use learner::Learner;
 pub use model::Model;
 pub use port::{Port, Prompted};
 pub use robot::Robot;
-pub use session::{Meter, Session};
+pub use session::{Meter, Sensors, Session};
 
 /// The conversation of a Twil: a differential drive with two motors, whose equations have three parameters in
 /// each row, measuring its forward speed and yaw rate.

@@ -3,7 +3,7 @@
 use loopsight_core::{ControlAffine, Plant};
 use loopsight_link::{
     Act, Configuration, Decoder, Hello, Measured, Note, PARAMETERS, Reason, Reply, Request,
-    SIGNALS, Unusable, VERSION, Welcome,
+    SIGNALS, Sensed, Unusable, VERSION, Welcome,
 };
 
 use crate::Robot;
@@ -25,7 +25,21 @@ impl Meter for () {
     }
 }
 
+/// What a robot's own sensors say, once per period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensors<const NU: usize> {
+    /// The controlled states.
+    pub measured: [f32; NU],
+    /// Voltage of the supply, V.
+    pub supply: f32,
+}
+
 /// A robot as its host talks to it: greeted, configured, running, at rest.
+///
+/// A robot without sensors ([`Session::new`]) is measured by its host, and answers each step with a command:
+/// its board calls [`Session::elapsed`] once per period. One with motors and encoders of its own
+/// ([`Session::with_sensors`]) ticks by its own timer, its board calls [`Session::sensed`] instead, and hands
+/// [`Session::output`] to the motors after it; steps of the host bring the reference.
 ///
 /// At any end of a run the motors are let go, the reason is said, and nothing but a new configuration
 /// lets the robot move again. Reasons are those of [`Reason`]:
@@ -47,6 +61,7 @@ pub struct Session<
     meter: M,
     period_us: u32,
     decoder: Decoder,
+    own_sensors: bool,
     session: u32,
     greeted: bool,
     run: Option<Run<P, NX, NU, NW, NP, NY, R>>,
@@ -68,6 +83,8 @@ struct Run<
     watch: Watch<NU>,
     /// A step has come since the configuration.
     begun: bool,
+    /// The reference of the last step, for a robot with sensors of its own.
+    wanted: [f32; NU],
 }
 
 impl<
@@ -96,12 +113,21 @@ where
             meter,
             period_us,
             decoder: Decoder::default(),
+            own_sensors: false,
             session: 0,
             greeted: false,
             run: None,
             tick: 0,
             dropped: 0,
             cost: 0,
+        }
+    }
+
+    /// A robot that was just switched on, with motors and encoders of its own.
+    pub fn with_sensors(period_us: u32, meter: M) -> Self {
+        Self {
+            own_sensors: true,
+            ..Self::new(period_us, meter)
         }
     }
 
@@ -125,6 +151,37 @@ where
             Some(Err(_)) => self.dropped = self.dropped.saturating_add(1),
             None => {}
         }
+    }
+
+    /// A period of the board's timer has gone by: what its sensors say, or `None` where motors or sensors
+    /// failed.
+    pub fn sensed(&mut self, sensors: Option<Sensors<NU>>, say: &mut dyn FnMut(&Reply)) {
+        self.elapsed(say);
+        if self.run.as_ref().is_none_or(|run| !run.begun) {
+            return;
+        }
+        let done = match sensors {
+            Some(sensors) => self.go(&sensors, say),
+            None => Err(Reason::Hardware),
+        };
+        if let Err(reason) = done {
+            self.rest(reason, say);
+        }
+    }
+
+    /// A tick by the board's own timer.
+    fn go(&mut self, sensors: &Sensors<NU>, say: &mut dyn FnMut(&Reply)) -> Result<(), Reason> {
+        let run = self.run.as_mut().ok_or(Reason::NotConfigured)?;
+        let fresh = run.watch.measured(0, sensors.supply)?;
+        let wanted = run.wanted;
+        let mut act = self.act(sensors.measured, fresh, &wanted)?;
+        act.sensed = Some(Sensed {
+            supply: sensors.supply,
+            measured: sensors.measured.iter().copied().collect(),
+            reference: wanted.iter().copied().collect(),
+        });
+        say(&Reply::Act(act));
+        Ok(())
     }
 
     /// A period of the board's timer has gone by.
@@ -215,6 +272,7 @@ where
                     robot: Robot::new(configuration, period).map_err(unusable)?,
                     watch,
                     begun: false,
+                    wanted: [0.0; NU],
                 });
                 self.tick = 0;
             }
@@ -226,37 +284,65 @@ where
     }
 
     fn step(&mut self, step: &Measured, say: &mut dyn FnMut(&Reply)) -> Result<(), Reason> {
+        let own_sensors = self.own_sensors;
         let run = self.run.as_mut().ok_or(Reason::NotConfigured)?;
+        let reference = <[f32; NU]>::try_from(step.reference.as_slice()).ok();
+        let reference = reference.filter(|r| r.iter().all(|v| v.is_finite()));
+        let reference = reference.ok_or(Reason::NotFinite)?;
+        match (own_sensors, step.measured.is_empty()) {
+            (true, true) => {
+                run.watch.heard();
+                run.wanted = reference;
+                run.begun = true;
+                return Ok(());
+            }
+            (true, false) => return Err(Reason::OwnSensors),
+            (false, true) => return Err(Reason::NoSensors),
+            (false, false) => {}
+        }
         if step.tick != self.tick {
             let (expected, found) = (self.tick, step.tick);
             return Err(Reason::OutOfOrder { expected, found });
         }
-        let fresh = run.watch.heard(step)?;
-        let finite = |list: &[f32]| list.iter().all(|v| v.is_finite());
-        let measured = <[f32; NU]>::try_from(step.measured.as_slice()).ok();
-        let measured = measured.filter(|m| finite(m)).ok_or(Reason::NotFinite)?;
-        if step.reference.len() != NU || !finite(&step.reference) {
+        run.watch.heard();
+        let fresh = run.watch.measured(step.age_us, step.supply)?;
+        let measured = <[f32; NU]>::try_from(step.measured.as_slice());
+        let act = self.act(measured.map_err(|_| Reason::NotFinite)?, fresh, &reference)?;
+        say(&Reply::Act(act));
+        Ok(())
+    }
+
+    /// One tick of the loop, and what is said of it.
+    fn act(
+        &mut self,
+        measured: [f32; NU],
+        fresh: bool,
+        reference: &[f32; NU],
+    ) -> Result<Act, Reason> {
+        let run = self.run.as_mut().ok_or(Reason::NotConfigured)?;
+        if !measured.iter().all(|v| v.is_finite()) {
             return Err(Reason::NotFinite);
         }
         let (applied, parameters) = (run.robot.applied(), run.robot.parameters());
         run.watch
             .turned::<P, NX, NW, NP, NY>(applied, &measured, parameters)?;
         self.meter.start();
-        let done = run.robot.tick(measured, fresh, &step.reference);
+        let done = run.robot.tick(measured, fresh, reference);
         let cost = core::mem::replace(&mut self.cost, self.meter.stop());
         let done = done.ok_or(Reason::NoCommand)?;
         run.begun = true;
-        self.tick = self.tick.wrapping_add(1);
-        say(&Reply::Act(Act {
+        let tick = self.tick;
+        self.tick = tick.wrapping_add(1);
+        Ok(Act {
             session: self.session,
-            tick: step.tick,
+            tick,
             command: done.applied.iter().copied().collect(),
             parameters: run.robot.parameters().iter().copied().collect(),
             saturated: done.outcome.saturated,
             held: done.outcome.held,
             learned: run.robot.learned(),
             cost,
-        }));
-        Ok(())
+            sensed: None,
+        })
     }
 }

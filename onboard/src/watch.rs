@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 use loopsight_core::{Place, Plant, Role};
-use loopsight_link::{Measured, Reason, SIGNALS, Safety, Unusable};
+use loopsight_link::{Reason, SIGNALS, Safety, Unusable};
 
 /// Speed of a shaft, in its unit, below which its encoder counts nothing.
 const STILL: f32 = 1e-6;
@@ -72,13 +72,17 @@ impl<const NU: usize> Watch<NU> {
         Ok(())
     }
 
-    /// A message to act upon has come; whether its measurement is young enough to learn from.
-    pub(crate) fn heard(&mut self, step: &Measured) -> Result<bool, Reason> {
+    /// A message to act upon has come.
+    pub(crate) fn heard(&mut self) {
         self.quiet = 0;
-        if step.supply.is_nan() || step.supply < self.safety.least_supply {
+    }
+
+    /// A measurement so old (µs), at this supply (V); whether it is young enough to learn from.
+    pub(crate) fn measured(&mut self, age_us: u32, supply: f32) -> Result<bool, Reason> {
+        if supply.is_nan() || supply < self.safety.least_supply {
             return Err(Reason::SupplyLow);
         }
-        let fresh = step.age_us <= self.safety.stale_us;
+        let fresh = age_us <= self.safety.stale_us;
         self.stale = if fresh {
             0
         } else {

@@ -3,50 +3,25 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
-use std::io::{Read, Write};
-use std::os::unix::net::UnixListener;
+mod desk;
+mod twil;
+
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 
+use desk::Desk;
 use loopsight_core::config::Source;
 use loopsight_core::loop_file::{Composed, LoopFile};
 use loopsight_core::model::Model;
 use loopsight_core::registry::{BuildError, DriverContext};
 use loopsight_core::{ControlError, TickError};
 use loopsight_drivers as _;
-use loopsight_link::{LONGEST, encode};
-use loopsight_onboard::Twil;
 
-/// A robot at a socket: it answers `steps` times, and then hangs up.
-fn robot(name: &str, steps: usize) -> (PathBuf, JoinHandle<()>) {
-    let socket = std::env::temp_dir().join(format!("loopsight-{}-{name}.line", std::process::id()));
-    let listener = UnixListener::bind(&socket).unwrap();
-    let path = socket.clone();
-    let thread = std::thread::spawn(move || {
-        let (mut line, _) = listener.accept().unwrap();
-        std::fs::remove_file(&path).unwrap();
-        let mut robot = Twil::new(10_000, ());
-        let mut answered = 0;
-        let mut buffer = [0; 256];
-        while answered < steps {
-            let Ok(length @ 1..) = line.read(&mut buffer) else {
-                return;
-            };
-            for byte in &buffer[..length] {
-                let mut said = Vec::new();
-                robot.take(*byte, &mut |reply| {
-                    let mut frame = [0; LONGEST];
-                    let length = encode(reply, &mut frame).unwrap();
-                    said.extend_from_slice(&frame[..length]);
-                });
-                answered += usize::from(!said.is_empty());
-                if !said.is_empty() && line.write_all(&said).is_err() {
-                    return;
-                }
-            }
-        }
-    });
-    (socket, thread)
+/// A robot at a socket: it hears `steps` steps, and then hangs up.
+fn robot(steps: usize) -> (PathBuf, JoinHandle<()>) {
+    let mut desk = Desk::measured();
+    desk.steps = steps;
+    desk.at_socket()
 }
 
 fn folder() -> PathBuf {
@@ -97,7 +72,7 @@ fn error(file: &LoopFile, composed: &mut Composed) -> f64 {
 fn a_loop_file_drives_what_is_at_the_end_of_the_line() {
     let mut errors = [0.0; 2];
     for (error_of, model) in errors.iter_mut().zip(["model.toml", "robot.toml"]) {
-        let (socket, thread) = robot(model, usize::MAX);
+        let (socket, thread) = robot(usize::MAX);
         let (file, mut composed) = compose(&socket, model, |text| text).unwrap();
         *error_of = error(&file, &mut composed);
         drop(composed);
@@ -110,7 +85,7 @@ fn a_loop_file_drives_what_is_at_the_end_of_the_line() {
 /// Commands of the law aboard are those of the law on the host, but for single precision.
 #[test]
 fn the_law_aboard_is_the_law_on_the_host() {
-    let (socket, thread) = robot("beside", usize::MAX);
+    let (socket, thread) = robot(usize::MAX);
     // Exact speeds: a count more or less would be another run.
     let exact = |text: String| text.replace("seed = 6", "quantize = false");
     let (_, mut aboard) = compose(&socket, "robot.toml", exact).unwrap();
@@ -136,8 +111,7 @@ fn the_law_aboard_is_the_law_on_the_host() {
 
 #[test]
 fn a_robot_that_hangs_up_ends_the_loop() {
-    // The greeting, the configuration, and ten steps.
-    let (socket, thread) = robot("gone", 12);
+    let (socket, thread) = robot(10);
     let (_, mut composed) = compose(&socket, "model.toml", |text| text).unwrap();
     for index in 0..10 {
         composed.tick(f64::from(index) * 0.01).unwrap();

@@ -37,6 +37,13 @@ pub(crate) fn run(options: &BringupOptions) -> Result<(), Failure> {
     let text = read_text(&options.file)?;
     let source = Source::parse(&options.file.display().to_string(), &text)?;
     let file = LoopFile::parse(&source)?;
+    if file.driver.runs_law() {
+        let id = file.driver.meta().id;
+        return Err(Failure::request(format!(
+            "the robot behind `{id}` runs its loop itself, and its motors cannot be driven one by one from here: \
+             bring-up needs a driver that takes inputs, like `linux_gpio`"
+        )));
+    }
     let (model, composed) = compose(&options.file, &source, &file)?;
     let ids: Vec<&str> = model.plant.inputs.iter().map(|s| s.id).collect();
     let limits = ids.iter().map(|id| limit_of(&source, &file, id));

@@ -36,7 +36,8 @@ pub(crate) fn run(options: &RunOptions) -> Result<(), Failure> {
     for path in log_path.iter().chain(&options.html).chain(&options.svg) {
         load::writable(path)?;
     }
-    let real_time = file.real_time || !file.driver.is_simulated();
+    // The timer of a robot that runs the law itself is not the host's to measure.
+    let real_time = (file.real_time || !file.driver.is_simulated()) && !file.driver.runs_law();
     let mut recorder = Recorder::new(&model, &composed, file.period_s, real_time);
     let mut log = match &log_path {
         None => None,
@@ -202,7 +203,10 @@ fn drive(
                     failed: !error.is_end(),
                     text: match &error {
                         TickError::Driver(e) => e.to_string(),
-                        TickError::Control(e) => e.to_string(),
+                        TickError::Control(e) => {
+                            let said = composed.host.controller.remark();
+                            said.map_or_else(|| e.to_string(), str::to_owned)
+                        }
                         TickError::Supervisor(event) => recorder.words(event),
                     },
                 };
@@ -213,6 +217,9 @@ fn drive(
             }
         };
         recorder.learn(composed, late);
+        if let Some(remark) = composed.host.controller.remark() {
+            recorder.happened(time, remark.to_owned());
+        }
         if let Some(log) = log.as_mut()
             && let Err(error) = write(log, recorder)
         {

@@ -63,6 +63,8 @@ pub(super) struct Recorder {
     row: Vec<f64>,
     signals: Vec<Signal>,
     turning: Vec<String>,
+    /// Parameters that the loop's estimator learns; those that follow are learned by the controller.
+    identified: usize,
     stopwatch: Option<Stopwatch>,
     was: [bool; 2],
     alike: [usize; 2],
@@ -121,6 +123,16 @@ impl Recorder {
                 });
             }
         }
+        let identified = parameters.len();
+        for own in &composed.estimated {
+            starts.push(own.start);
+            parameters.push(ParameterTrace {
+                name: format!("{} aboard", own.name),
+                unit: own.unit.to_owned(),
+                values: Vec::new(),
+                std: None,
+            });
+        }
         Self {
             errors: vec![Sums::default(); composed.controlled.len()],
             innovations: vec![Sums::default(); innovations.len()],
@@ -144,6 +156,7 @@ impl Recorder {
             fallen: 0,
             row: Vec::new(),
             turning: turning(model),
+            identified,
             signals: model.measured.iter().map(|m| *m.signal).collect(),
             stopwatch: real_time.then(Stopwatch::default),
             was: [false; 2],
@@ -164,8 +177,11 @@ impl Recorder {
             headers.push("fallen_back_1".to_owned());
         }
         let named = |prefix: &str, id: &str, unit: &str| format!("{prefix}_{}", column(id, unit));
-        for p in &self.record.parameters {
+        for p in &self.record.parameters[..self.identified] {
             headers.push(named("learned", &p.name, &p.unit));
+        }
+        for own in &composed.estimated {
+            headers.push(named("aboard", &own.name, own.unit));
         }
         for i in &self.record.innovations {
             headers.push(named("innovation", &i.id, &i.unit));
@@ -270,6 +286,18 @@ impl Recorder {
                     next += 1;
                 }
             }
+        }
+        let aboard = composed.host.controller.estimates();
+        for own in 0..composed.estimated.len() {
+            let value = aboard.get(own).copied().unwrap_or(f64::NAN);
+            self.row.push(value);
+            self.estimates[self.identified + own] = value;
+            if keeps {
+                let trace = &mut self.record.parameters[self.identified + own];
+                trace.values.push(value);
+            }
+        }
+        if let Some(identification) = &composed.host.observer {
             for row in 0..identification.len() {
                 let lesson = identification.lesson(row);
                 let excitation = identification.estimator(row).excitation();
