@@ -46,6 +46,8 @@ pub(crate) enum Command {
     Bringup(BringupOptions),
     /// Run a control loop.
     Run(RunOptions),
+    /// Tell a robot, waiting or driving, the model, effects and law of a loop file.
+    Send(SendOptions),
     /// Print a completion script for a shell.
     Completions {
         /// The shell.
@@ -277,6 +279,20 @@ pub(crate) struct RunOptions {
     /// Write a picture (SVG) for a text.
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SendOptions {
+    /// Loop file, its law in [controller.aboard].
+    #[arg(value_name = "LOOP")]
+    pub(crate) file: PathBuf,
+    /// Serial port or unix socket of the robot, or the `door` of a run; by default what the loop file says,
+    /// its `door` first.
+    #[arg(long, value_name = "LINE")]
+    pub(crate) line: Option<String>,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

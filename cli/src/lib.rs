@@ -23,7 +23,6 @@ use clap::Parser as _;
 use loopsight_controllers as _;
 use loopsight_drivers as _;
 use loopsight_estimators as _;
-use loopsight_onboard as _;
 use loopsight_plants as _;
 
 use arguments::{Arguments, Command};
@@ -69,6 +68,7 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         Command::Improve(options) => commands::improve::run(options),
         Command::Bringup(options) => commands::bringup::run(options),
         Command::Run(options) => commands::run::run(options),
+        Command::Send(options) => commands::send::run(options),
         Command::Completions { shell } => {
             commands::completions::run(*shell);
             Ok(())

@@ -94,3 +94,89 @@ fn a_robot_that_is_not_there_fails_in_words() {
     assert_eq!(output.status.code(), Some(2), "{complaint}");
     assert!(complaint.contains("runs its loop itself"), "{complaint}");
 }
+
+/// A robot that waits takes what it is sent, and says so; what it does not know is refused by name.
+#[test]
+fn a_robot_that_waits_is_sent_a_model() {
+    let folder = folder();
+    let friction = "\n[[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel = 1.5\n";
+    let model = std::fs::read_to_string(folder.path().join("model.toml")).unwrap();
+    std::fs::write(folder.path().join("model.toml"), model.clone() + friction).unwrap();
+    let (line, thread) = Desk::with_body().at_port();
+    write(folder.path(), "loop.toml", LOOP, Path::new("/dev/ttyNONE7"));
+    let line = line.display().to_string();
+    let text = said(folder.path(), &["send", "loop.toml", "--line", &line]);
+    let first = format!("the robot at {line} (ddmr, every 0.01 s) took it, and is at rest\n");
+    assert!(text.starts_with(&first), "{text}");
+    let told = "coulomb_friction at wheel.right, wheel.left: level 1.5 V, width 0.1 rad/s";
+    assert!(text.contains(told), "{text}");
+    thread.join().unwrap();
+
+    // Nothing of this reaches a line.
+    let lag =
+        "\n[[effect]]\n[effect.actuator_lag]\nat = [\"input.right\", \"input.left\"]\nlag = 0.05\n";
+    std::fs::write(folder.path().join("model.toml"), model + lag).unwrap();
+    let output = loopsight(folder.path(), &["send", "loop.toml"]);
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{complaint}");
+    let expected = "the effect `actuator_lag` of the model is not known aboard";
+    assert!(complaint.contains(expected), "{complaint}");
+    let (before, _) = LOOP.split_once("[controller.aboard]").unwrap();
+    let here = "[controller.feedback_linearizing_pi]\nsettling_time_s = 0.45\nlimit = 12.0\n";
+    std::fs::write(folder.path().join("here.toml"), before.to_owned() + here).unwrap();
+    let output = loopsight(folder.path(), &["send", "here.toml"]);
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{complaint}");
+    assert!(complaint.contains("runs here"), "{complaint}");
+}
+
+/// A robot that drives is told a better model through the run that drives it, and goes on: the error falls
+/// while it drives, and the log says when.
+#[test]
+fn a_robot_that_drives_is_sent_a_better_model() {
+    let folder = folder();
+    let mut desk = Desk::with_friction([1.6, 0.3]);
+    // As slow as its timer would be: there is time for a second command.
+    desk.paced = true;
+    let (line, thread) = desk.at_port();
+    let door = folder.path().join("door");
+    let with_door = LOOP
+        .replace(
+            "[controller.aboard]\n",
+            &format!("[controller.aboard]\ndoor = \"{}\"\n", door.display()),
+        )
+        .replace("duration_s = 20.0", "duration_s = 6.0");
+    write(folder.path(), "loop.toml", &with_door, &line);
+    let friction = "\n[[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel = 1.6\nwidth = 0.3\n";
+    let model = std::fs::read_to_string(folder.path().join("model.toml")).unwrap();
+    std::fs::write(folder.path().join("better.toml"), model + friction).unwrap();
+    write(
+        folder.path(),
+        "better_loop.toml",
+        &with_door.replace("\"model.toml\"", "\"better.toml\""),
+        &line,
+    );
+    let run = std::thread::scope(|scope| {
+        let run = scope.spawn(|| said(folder.path(), &["run", "loop.toml"]));
+        let opened = (0..1000).any(|_| {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+            door.exists()
+        });
+        assert!(opened);
+        let text = said(folder.path(), &["send", "better_loop.toml"]);
+        let first = format!(
+            "the robot at {} (ddmr, every 0.01 s) drives on with it\n",
+            door.display()
+        );
+        assert!(text.starts_with(&first), "{text}");
+        run.join().unwrap()
+    });
+    thread.join().unwrap();
+    let event = "the robot was told another model, with coulomb_friction";
+    assert!(run.contains(event), "{run}");
+    let log = std::fs::read_to_string(folder.path().join("log.csv")).unwrap();
+    let told: Vec<_> = log.lines().filter(|l| l.contains(event)).collect();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(log.lines().filter(|l| !l.starts_with('#')).count() == 601);
+    assert!(!door.exists());
+}

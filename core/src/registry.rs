@@ -320,7 +320,7 @@ pub enum HalfError {
 
 /// A driver as it stands in a file: `[driver.<id>]`.
 #[typetag::serde]
-pub trait DriverPart: Debug + Send + Sync {
+pub trait DriverPart: Debug + Send + Sync + Any {
     /// The declaration.
     fn meta(&self) -> &'static PartMeta;
     /// Builds it.

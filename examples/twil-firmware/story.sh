@@ -32,8 +32,10 @@ echo "== The robot is told the model without friction, and drives."
 "$loopsight" run loop.toml
 echo "== What does the model lack?"
 "$loopsight" improve model.toml loop.csv -o better.toml
-echo "== The robot is told the improved model, and drives again."
 sed -e 's/"model.toml" /"better.toml"/' -e 's/"loop.csv"/"better.csv"/' loop.toml >better_loop.toml
+echo "== Does the robot take the improved model?"
+"$loopsight" send better_loop.toml
+echo "== It is told the improved model, and drives again."
 "$loopsight" run better_loop.toml
 before=$(error loop.csv) after=$(error better.csv)
 echo "tracking error, rms: $before mm/s before, $after mm/s after"

@@ -141,4 +141,7 @@ pub enum Note {
     Dropped(u32),
     /// The robot was reset and waits for a greeting.
     Started,
+    /// Said by a host on behalf of the robot that it runs: the robot drives, and goes on with what it is
+    /// told.
+    Runs,
 }

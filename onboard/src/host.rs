@@ -2,9 +2,12 @@
 
 mod configured;
 mod conversation;
+#[cfg(unix)]
+mod door;
 mod line;
 mod open;
 mod remote;
+mod send;
 mod serial;
 
 use loopsight_controllers::FeedbackLinearizingPiSettings;
@@ -18,6 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use conversation::Conversation;
 pub use line::{Line, LineError};
+pub use send::{Acknowledged, SendError, send};
 pub use serial::Serial;
 
 /// A law that runs aboard a robot, told to it once before its first step: model, effects, learning and law of
@@ -38,6 +42,9 @@ pub struct Aboard {
     /// How long the robot may take to answer, s.
     #[serde(default = "timeout")]
     pub timeout_s: f64,
+    /// Unix socket at which a run of this loop takes another model for the robot: `loopsight send`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub door: Option<String>,
     /// The law, as in `[controller.feedback_linearizing_pi]`.
     pub law: FeedbackLinearizingPiSettings,
     /// The estimators, as in `[estimator.rls]`; without it nothing is learned aboard.
@@ -161,6 +168,12 @@ const META: PartMeta = PartMeta {
             "how long the robot may take to answer; default 2 s",
         ),
         Setting::new(
+            "door",
+            "",
+            "unix socket at which a run takes another model for the robot while it drives, from `loopsight send`; \
+             default: none",
+        ),
+        Setting::new(
             "law",
             "",
             "table: the law, as in `[controller.feedback_linearizing_pi]`, from gains",
@@ -207,7 +220,7 @@ impl ControllerPart for Aboard {
         }
         let configuration = self.configuration(model, period)?;
         let line = Line::at(line, self.baud, self.timeout_s);
-        let robot = Conversation::new(line, configuration, period);
+        let robot = Conversation::new(line, configuration, period).with_door(self.door.as_ref());
         Ok(Box::new(remote::Remote::new(robot, self.learned(model))))
     }
 

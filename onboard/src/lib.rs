@@ -33,8 +33,9 @@ mod watch;
 pub use effects::effect;
 pub use efforts::Efforts;
 #[cfg(feature = "std")]
-pub use host::{Aboard, Line, LineError, SafetySettings, Serial};
+pub use host::{Aboard, Acknowledged, Line, LineError, SafetySettings, SendError, Serial, send};
 pub use learner::Learner;
+pub use loopsight_link::Attachment;
 pub use model::Model;
 pub use port::{Port, Prompted};
 pub use robot::Robot;

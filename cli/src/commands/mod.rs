@@ -13,4 +13,5 @@ pub(crate) mod improve;
 pub(crate) mod list;
 pub(crate) mod new;
 pub(crate) mod run;
+pub(crate) mod send;
 pub(crate) mod simulate;

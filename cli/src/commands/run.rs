@@ -117,6 +117,16 @@ fn beside(file: &Path, path: &str) -> PathBuf {
         .map_or_else(|| PathBuf::from(path), |folder| folder.join(path))
 }
 
+/// The model of a loop file.
+pub(crate) fn model_of(path: &Path, source: &Source, file: &LoopFile) -> Result<Model, Failure> {
+    let model_path = beside(path, &file.model);
+    if !model_path.exists() {
+        let message = format!("there is no model file {}", model_path.display());
+        return Err(source.error(&["model".into()], &message, None).into());
+    }
+    Ok(Model::load(&model_path)?.0)
+}
+
 /// Composes the loop of a loop file.
 pub(crate) fn compose(
     path: &Path,
@@ -128,12 +138,7 @@ pub(crate) fn compose(
         let message = format!("that is {ticks:.1e} ticks, expected at most {MOST_TICKS:e}");
         return Err(source.error(&["duration_s".into()], &message, None).into());
     }
-    let model_path = beside(path, &file.model);
-    if !model_path.exists() {
-        let message = format!("there is no model file {}", model_path.display());
-        return Err(source.error(&["model".into()], &message, None).into());
-    }
-    let (model, _) = Model::load(&model_path)?;
+    let model = model_of(path, source, file)?;
     let load_model = |name: &str| {
         Model::load(&beside(path, name))
             .map(|(model, _)| model)

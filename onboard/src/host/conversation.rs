@@ -1,19 +1,39 @@
 //! What a host says to a robot, from the greeting to the end.
 
+use std::collections::VecDeque;
+
 use loopsight_link::{
-    Act, Configuration, Hello, Measured, Reply, Request, SIGNALS, Signals, VERSION, Welcome,
+    Act, Configuration, Hello, Measured, Note, Reason, Reply, Request, SIGNALS, Signals, Unusable,
+    VERSION, Welcome,
 };
 
+#[cfg(unix)]
+use super::door::Door;
 use super::{Line, LineError};
 
 /// A session with a robot.
-#[derive(Debug)]
 pub(super) struct Conversation {
     pub(super) line: Line,
     configuration: Configuration,
     period_us: u32,
     session: u32,
     begun: bool,
+    /// What the robot did while something else was waited for.
+    acts: VecDeque<Act>,
+    #[cfg(unix)]
+    door: Option<Door>,
+    door_at: Option<String>,
+    welcome: Option<Welcome>,
+}
+
+/// What a robot answered to a greeting.
+#[derive(Debug)]
+pub(super) struct Greeted {
+    pub(super) welcome: Welcome,
+    /// Somebody runs it, and answered for it.
+    pub(super) runs: bool,
+    /// It came to rest by the greeting.
+    pub(super) interrupted: bool,
 }
 
 /// A number that no session before had: of the random keys that the standard library draws.
@@ -27,6 +47,25 @@ fn told(values: &[f64]) -> Signals {
     values.iter().map(|v| *v as f32).take(SIGNALS).collect()
 }
 
+/// What is wrong with a configuration, with the names of its effects.
+fn named(what: Unusable, configuration: &Configuration) -> String {
+    let of = |i: u8| {
+        let effect = configuration.effects.get(usize::from(i));
+        effect.map_or("?", |effect| effect.id.as_str())
+    };
+    match what {
+        Unusable::Effect(i) => format!("the effect `{}` is not known to its firmware", of(i)),
+        Unusable::Channel(i) => {
+            format!(
+                "the effect `{}` acts where its firmware compensates nothing",
+                of(i)
+            )
+        }
+        Unusable::Reads(i) => format!("the effect `{}` reads what it does not know", of(i)),
+        other => other.to_string(),
+    }
+}
+
 impl Conversation {
     pub(super) fn new(line: Line, configuration: Configuration, period: f64) -> Self {
         Self {
@@ -35,13 +74,25 @@ impl Conversation {
             period_us: (period * 1e6).round() as u32,
             session: drawn(),
             begun: false,
+            acts: VecDeque::new(),
+            #[cfg(unix)]
+            door: None,
+            door_at: None,
+            welcome: None,
         }
+    }
+
+    /// The same, with a socket at which another model is taken while the robot runs.
+    pub(super) fn with_door(mut self, at: Option<&String>) -> Self {
+        self.door_at = at.cloned();
+        self
     }
 
     /// A new session, begun when something is next to be said.
     pub(super) fn renew(&mut self) {
         self.session = drawn();
         self.begun = false;
+        self.acts.clear();
     }
 
     /// Greets and configures, the first time. What a robot says of itself meanwhile is of no matter.
@@ -49,23 +100,37 @@ impl Conversation {
         if self.begun {
             return Ok(());
         }
-        self.greet()?;
+        self.welcome = Some(self.greet()?.welcome);
         self.configure()?;
+        #[cfg(unix)]
+        if let Some(at) = &self.door_at
+            && self.door.is_none()
+        {
+            self.door = Some(Door::open(at)?);
+        }
         self.begun = true;
         Ok(())
     }
 
     /// Greets; what the robot answers.
-    pub(super) fn greet(&mut self) -> Result<Welcome, LineError> {
+    pub(super) fn greet(&mut self) -> Result<Greeted, LineError> {
         let session = self.session;
         let hello = Hello {
             version: VERSION,
             session,
         };
         self.line.say(&Request::Hello(hello))?;
-        let welcome = self.line.hear(|reply| match reply {
-            Reply::Hello(welcome) if welcome.hello.session == session => Some(Ok(welcome)),
-            _ => None,
+        let (mut runs, mut interrupted) = (false, false);
+        let welcome = self.line.hear(|reply| {
+            match reply {
+                Reply::Hello(welcome) if welcome.hello.session == session => {
+                    return Some(Ok(welcome));
+                }
+                Reply::Log(Note::Runs) => runs = true,
+                Reply::Stopped { reason, .. } => interrupted = reason == Reason::HostRestarted,
+                _ => {}
+            }
+            None
         })?;
         let line = self.line.path().to_owned();
         if welcome.hello.version != VERSION {
@@ -89,7 +154,11 @@ impl Conversation {
                 found_s: f64::from(welcome.period_us) * 1e-6,
             });
         }
-        Ok(welcome)
+        Ok(Greeted {
+            welcome,
+            runs,
+            interrupted,
+        })
     }
 
     /// Sends the configuration, and waits until it is in use.
@@ -100,11 +169,89 @@ impl Conversation {
             session,
             configuration,
         })?;
-        self.line.hear(|reply| match reply {
-            Reply::Configured { session: of } if of == session => Some(Ok(())),
-            Reply::Stopped { reason, .. } => Some(Err(LineError::AtRest { reason })),
+        let acts = &mut self.acts;
+        let refused = self.line.hear(|reply| match reply {
+            Reply::Configured { session: of } if of == session => Some(Ok(None)),
+            Reply::Stopped { reason, .. } => Some(Ok(Some(reason))),
+            // A robot that runs by its own timer does not wait for this.
+            Reply::Act(act) if act.session == session => {
+                acts.push_back(act);
+                None
+            }
             _ => None,
-        })
+        })?;
+        match refused {
+            None => Ok(()),
+            Some(Reason::Configuration(what)) => Err(LineError::Refused {
+                line: self.line.path().to_owned(),
+                what: named(what, &self.configuration),
+                unusable: what,
+            }),
+            Some(reason) => Err(LineError::AtRest { reason }),
+        }
+    }
+
+    /// Sees to the door: another model is passed on to the robot. What there is to say of it.
+    #[cfg(unix)]
+    pub(super) fn serve(&mut self) -> Result<Option<String>, LineError> {
+        let Some(mut door) = self.door.take() else {
+            return Ok(None);
+        };
+        let mut said = Ok(None);
+        while let Some(request) = door.asked() {
+            match (request, &self.welcome) {
+                (Request::Hello(hello), Some(welcome)) => {
+                    let session = hello.session;
+                    let hello = Hello {
+                        session,
+                        version: VERSION,
+                    };
+                    door.answer(&Reply::Log(Note::Runs));
+                    door.answer(&Reply::Hello(Welcome {
+                        hello,
+                        ..welcome.clone()
+                    }));
+                }
+                (
+                    Request::Configure {
+                        session,
+                        configuration,
+                    },
+                    _,
+                ) => {
+                    self.configuration = configuration;
+                    let done = self.configure();
+                    door.answer(&match &done {
+                        Ok(()) => Reply::Configured { session },
+                        Err(error) => Reply::Stopped {
+                            session,
+                            tick: 0,
+                            reason: error.reason(),
+                        },
+                    });
+                    said = done.map(|()| Some(self.changed()));
+                }
+                // Nobody but this run moves or stops the robot.
+                _ => {}
+            }
+        }
+        self.door = Some(door);
+        said
+    }
+
+    /// There are no doors.
+    #[cfg(not(unix))]
+    pub(super) fn serve(&mut self) -> Result<Option<String>, LineError> {
+        Ok(None)
+    }
+
+    fn changed(&self) -> String {
+        let effects = self.configuration.effects.iter().map(|e| e.id.as_str());
+        let effects: Vec<&str> = effects.collect();
+        match &effects[..] {
+            [] => "the robot was told another model, without effects".to_owned(),
+            some => format!("the robot was told another model, with {}", some.join(", ")),
+        }
     }
 
     /// Says a step; of a robot with sensors of its own nothing was measured here.
@@ -127,11 +274,14 @@ impl Conversation {
     /// The robot's next act, with as many commands as it should have.
     pub(super) fn act(&mut self, commands: usize) -> Result<Act, LineError> {
         let session = self.session;
-        let act = self.line.hear(|reply| match reply {
-            Reply::Act(act) if act.session == session => Some(Ok(act)),
-            Reply::Stopped { reason, .. } => Some(Err(LineError::AtRest { reason })),
-            _ => None,
-        })?;
+        let act = match self.acts.pop_front() {
+            Some(act) => act,
+            None => self.line.hear(|reply| match reply {
+                Reply::Act(act) if act.session == session => Some(Ok(act)),
+                Reply::Stopped { reason, .. } => Some(Err(LineError::AtRest { reason })),
+                _ => None,
+            })?,
+        };
         self.sized("commands", act.command.len(), commands)?;
         Ok(act)
     }

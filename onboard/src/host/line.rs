@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
-use loopsight_link::{Decoder, LONGEST, Reason, Reply, Request, encode};
+use loopsight_link::{Decoder, LONGEST, Reason, Reply, Request, Unusable, encode};
 
 use super::open::{self, Stream};
 
@@ -115,6 +115,16 @@ pub enum LineError {
         /// Why.
         reason: Reason,
     },
+    /// The robot cannot use what it was told, and is at rest.
+    #[error("the robot at `{line}` refuses what it was told, and is at rest: {what}")]
+    Refused {
+        /// The line.
+        line: String,
+        /// What is wrong.
+        what: String,
+        /// The same, as the robot said it.
+        unusable: Unusable,
+    },
     /// What the robot sent is not of the sizes that its plant has.
     #[error("the robot at `{line}` sent {found} {what}, expected {expected}")]
     Sizes {
@@ -127,6 +137,17 @@ pub enum LineError {
         /// How many there should be.
         expected: usize,
     },
+}
+
+impl LineError {
+    /// The reason for which a robot rests after this.
+    pub(super) fn reason(&self) -> Reason {
+        match self {
+            LineError::AtRest { reason } => *reason,
+            LineError::Refused { unusable, .. } => Reason::Configuration(*unusable),
+            _ => Reason::LinkLost,
+        }
+    }
 }
 
 fn listed(ports: &[String]) -> String {

@@ -34,6 +34,7 @@ impl Remote {
         command: &mut [f64],
     ) -> Result<Command, LineError> {
         self.robot.begin()?;
+        self.remark = self.robot.serve()?;
         self.robot.step(self.tick, measured, reference)?;
         let act = loop {
             let act = self.robot.act(command.len())?;
@@ -58,7 +59,9 @@ impl Remote {
 /// What a loop is told of an error of the line; the words are in [`Controller::remark`].
 pub(super) fn kind(error: &LineError) -> ControlError {
     match error {
-        LineError::AtRest { reason } => ControlError::AtRest(reason.id()),
+        LineError::AtRest { .. } | LineError::Refused { .. } => {
+            ControlError::AtRest(error.reason().id())
+        }
         LineError::Sizes { .. } => ControlError::Sizes,
         _ => ControlError::NoAnswer,
     }
@@ -73,7 +76,6 @@ impl Controller<f64> for Remote {
         _model: &mut dyn AffineModel<f64>,
         command: &mut [f64],
     ) -> Result<Command, ControlError> {
-        self.remark = None;
         self.ask(reference, measured, command).map_err(|error| {
             let kind = kind(&error);
             self.remark = Some(error.to_string());

@@ -113,7 +113,7 @@ impl DriverPart for Serial {
         }
         let line = Line::at(&self.line, self.baud, self.timeout_s);
         let talk = Arc::new(Mutex::new(Talk {
-            robot: Conversation::new(line, configuration, period),
+            robot: Conversation::new(line, configuration, period).with_door(aboard.door.as_ref()),
             act: None,
         }));
         let body = Body {
@@ -198,7 +198,7 @@ impl Body {
 fn lost(error: &LineError) -> HostDriverError {
     let fault = match error {
         LineError::NoAnswer { .. } | LineError::HungUp { .. } => DriverFault::Disconnected,
-        LineError::AtRest { .. } => DriverFault::Rejected,
+        LineError::AtRest { .. } | LineError::Refused { .. } => DriverFault::Rejected,
         _ => DriverFault::Io,
     };
     let message = error.to_string();
@@ -250,8 +250,10 @@ impl Controller<f64> for Law {
         command: &mut [f64],
     ) -> Result<Command, ControlError> {
         let mut talk = held(&self.talk);
-        self.remark = None;
-        if let Err(error) = talk.robot.step(tick.index as u32, &[], reference) {
+        let served = talk.robot.serve();
+        let step = |talk: &mut Talk| talk.robot.step(tick.index as u32, &[], reference);
+        let said = served.and_then(|remark| step(&mut talk).map(|()| remark));
+        if let Err(error) = said.map(|remark| self.remark = remark) {
             self.remark = Some(error.to_string());
             return Err(kind(&error));
         }

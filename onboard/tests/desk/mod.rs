@@ -32,6 +32,8 @@ pub(crate) struct Desk {
     pub(crate) loses: Vec<u32>,
     /// Supply that it measures at its ticks, V.
     pub(crate) supply: fn(u32) -> f32,
+    /// A period takes its time.
+    pub(crate) paced: bool,
     ticks: u32,
 }
 
@@ -67,6 +69,7 @@ impl Desk {
             steps: usize::MAX,
             loses: Vec::new(),
             supply: |_| 12.0,
+            paced: false,
             ticks: 0,
         }
     }
@@ -107,6 +110,9 @@ impl Desk {
         let Some(body) = &mut self.body else {
             return false;
         };
+        if self.paced {
+            std::thread::sleep(Duration::from_micros(PERIOD_US.into()));
+        }
         let sensors = Sensors {
             measured: self.measured,
             supply: (self.supply)(self.ticks),
