@@ -4,13 +4,15 @@ use loopsight_core::{Clock, Driver, DriverFault, Real, Sample};
 
 /// A driver whose measurements are put in before a tick, and whose inputs are taken out after it.
 ///
-/// What is not finite is refused; at rest its inputs are zero.
+/// What is not finite is refused, what the supply cannot give is cut; at rest its inputs are zero.
 #[derive(Clone, Debug)]
 pub struct Port<S, const N: usize> {
     /// What the next tick measures.
     pub measured: [S; N],
     /// The measurement is young enough to learn from.
     pub fresh: bool,
+    /// Largest magnitude of an input that the supply can give.
+    pub most: S,
     /// What the last tick applied.
     pub applied: [S; N],
 }
@@ -20,6 +22,7 @@ impl<S: Real, const N: usize> Default for Port<S, N> {
         Self {
             measured: [S::of(f64::NAN); N],
             fresh: false,
+            most: S::of(f64::INFINITY),
             applied: [S::zero(); N],
         }
     }
@@ -44,8 +47,8 @@ impl<S: Real, const N: usize> Driver<S> for Port<S, N> {
             return Err(DriverFault::Rejected);
         }
         for ((own, to), from) in self.applied.iter_mut().zip(applied).zip(command) {
-            *own = *from;
-            *to = *from;
+            *own = from.held(-self.most, self.most);
+            *to = *own;
         }
         Ok(())
     }

@@ -124,6 +124,11 @@ where
         })
     }
 
+    /// From now on the supply gives inputs up to this magnitude.
+    pub fn give_at_most(&mut self, most: f32) {
+        self.inner.driver.most = most;
+    }
+
     /// What the motors get.
     pub fn applied(&self) -> &[f32; NU] {
         &self.inner.driver.applied

@@ -173,6 +173,10 @@ where
     fn go(&mut self, sensors: &Sensors<NU>, say: &mut dyn FnMut(&Reply)) -> Result<(), Reason> {
         let run = self.run.as_mut().ok_or(Reason::NotConfigured)?;
         let fresh = run.watch.measured(0, sensors.supply)?;
+        // A bridge gives no more than its supply, and the law, what is learned and the log must know.
+        if P::META.inputs.iter().all(|input| input.unit == "V") {
+            run.robot.give_at_most(sensors.supply.max(0.0));
+        }
         let wanted = run.wanted;
         let mut act = self.act(sensors.measured, fresh, &wanted)?;
         act.sensed = Some(Sensed {

@@ -85,6 +85,10 @@ fn the_firmware_does_what_the_desk_does() {
     let (learned, costs) = drive(&mut board, &mut twin, TICKS);
     assert!(learned > TICKS, "{learned} lessons of two regressions");
     told("all", costs);
+    let stack = board.stack();
+    println!("stack: {stack} bytes at most");
+    // With what is static it must fit the 128 KiB of a board that people own, and leave room.
+    assert!(stack < 64 << 10, "{stack}");
 }
 
 /// What each part of a tick costs: the same loop without it.

@@ -185,3 +185,17 @@ fn it_is_told_a_better_model_on_the_run() {
     assert_eq!((act.tick, &act.parameters), (200, &better.parameters));
     assert!((own.measured[0] - 0.1).abs() < 0.01, "{:?}", own.measured);
 }
+
+/// What the supply cannot give is not said to have been given.
+#[test]
+fn a_supply_below_the_limit_of_the_law() {
+    let mut own = Own::new();
+    own.supply = 10.0;
+    own.wants([0.5, 0.0]);
+    let said = own.go();
+    let [Reply::Act(act)] = &said[..] else {
+        panic!("{said:?}")
+    };
+    assert_eq!(&act.command[..], &[10.0, 10.0][..]);
+    assert_eq!(own.robot.output(), Some(&[10.0, 10.0]));
+}

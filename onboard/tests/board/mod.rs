@@ -10,6 +10,7 @@
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
@@ -21,9 +22,14 @@ const SHIFT: u32 = 6;
 /// What a count of the board's timer is worth.
 pub(crate) const INSTRUCTIONS_PER_COUNT: f64 = 40.0 / (1u32 << SHIFT) as f64;
 
+/// Where the board's memory begins, and how much there is (`memory.x`).
+const RAM: (u32, usize) = (0x2000_0000, 4 << 20);
+
 pub(crate) struct Board {
     machine: Child,
     line: UnixStream,
+    /// Socket of the machine's monitor.
+    monitor: PathBuf,
     decoder: Decoder,
     /// What has come and was not looked at.
     rest: Vec<u8>,
@@ -38,9 +44,11 @@ impl Board {
         let number = BOARDS.fetch_add(1, Ordering::Relaxed);
         let name = format!("loopsight-{}-{number}.line", std::process::id());
         let socket = std::env::temp_dir().join(name);
+        let monitor = socket.with_extension("monitor");
         let machine = Command::new("qemu-system-arm")
             .args(["-machine", "mps2-an386", "-cpu", "cortex-m4"])
-            .args(["-display", "none", "-monitor", "none"])
+            .args(["-display", "none", "-monitor"])
+            .arg(format!("unix:{},server=on,wait=off", monitor.display()))
             .args(["-icount", &format!("shift={SHIFT}")])
             .arg("-serial")
             .arg(format!("unix:{},server=on,wait=on", socket.display()))
@@ -61,6 +69,7 @@ impl Board {
         let mut board = Self {
             machine,
             line,
+            monitor,
             decoder: Decoder::default(),
             rest: Vec::new(),
         };
@@ -95,6 +104,27 @@ impl Board {
         }
     }
 
+    /// Bytes between the top of the stack and the lowest one that was ever written. What is static lies at
+    /// the bottom of a memory of which nearly all is never touched, and begins as zeros.
+    pub(crate) fn stack(&mut self) -> usize {
+        let image = self.monitor.with_extension("ram");
+        let (from, size) = RAM;
+        let mut monitor = UnixStream::connect(&self.monitor).unwrap();
+        let ask = format!("pmemsave {from:#x} {size:#x} \"{}\"\n", image.display());
+        monitor.write_all(ask.as_bytes()).unwrap();
+        let ram = (0..200).find_map(|_| {
+            std::thread::sleep(Duration::from_millis(50));
+            std::fs::read(&image).ok().filter(|ram| ram.len() == size)
+        });
+        let ram = ram.expect("the machine saves its memory");
+        std::fs::remove_file(&image).unwrap();
+        // Static data ends far below the middle, and no stack comes near it.
+        let middle = size / 2;
+        let lowest = ram[middle..].iter().position(|byte| *byte != 0).unwrap();
+        assert!(lowest > 0, "the stack has reached the middle of the memory");
+        size - middle - lowest
+    }
+
     /// Writes bytes on the line.
     pub(crate) fn send(&mut self, bytes: &[u8]) {
         self.line.write_all(bytes).unwrap();
@@ -114,5 +144,6 @@ impl Drop for Board {
         // Nothing is left to be done about a machine that is gone already.
         let _ = self.machine.kill();
         let _ = self.machine.wait();
+        let _ = std::fs::remove_file(&self.monitor);
     }
 }
