@@ -144,8 +144,8 @@ fn mistakes_are_pointed_at() {
             "open_loop",
         ),
         ("limit = 12.0 }", "limit = [12.0] }", "a list of 2"),
-        ("watchdog_s = 1.0", "watchdog_s = 0.0", "above 0 s"),
-        ("watchdog_s = 1.0", "encoder_input = -1.0", "above 0"),
+        ("watchdog_s = 5.0", "watchdog_s = 0.0", "above 0 s"),
+        ("watchdog_s = 5.0", "encoder_input = -1.0", "above 0"),
         (
             "[reference]\n",
             "[controller.aboard.rls]\nforgetting = 2.0\n[reference]\n",
