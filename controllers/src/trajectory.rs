@@ -1,6 +1,6 @@
 //! Following a path in time, around a velocity loop.
 
-use loopsight_core::{AffineModel, Command, ControlError, Controller, Real, Tick};
+use loopsight_core::{AffineModel, Command, ControlError, Controller, Real, Sample, Tick};
 
 mod path;
 #[cfg(feature = "std")]
@@ -162,6 +162,10 @@ impl<S: Real, C: Controller<S>> Controller<S> for Trajectory<S, C> {
         for (to, from) in reference.iter_mut().zip(self.demand) {
             *to = from;
         }
+    }
+
+    fn sampled(&mut self, sample: &Sample<S>) {
+        self.velocity.sampled(sample);
     }
 
     fn estimates(&self) -> &[S] {

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::{Observation, Real, Tick};
+use crate::{Observation, Real, Sample, Tick};
 
 /// What a controller says of the command it wrote.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -98,6 +98,10 @@ pub trait Controller<S: Real>: Send {
         model: &mut dyn AffineModel<S>,
         command: &mut [S],
     ) -> Result<Command, ControlError>;
+    /// Takes how old the measurement of the next step is, where that matters to it.
+    fn sampled(&mut self, sample: &Sample<S>) {
+        let _ = sample;
+    }
     /// Replaces the loop's references by those of the last step, where the controller makes its own
     /// (it follows a path): what was tracked, for logs and whoever watches over the loop.
     fn demand(&self, reference: &mut [S]) {
@@ -126,6 +130,9 @@ impl<S: Real, C: Controller<S> + ?Sized> Controller<S> for Box<C> {
         command: &mut [S],
     ) -> Result<Command, ControlError> {
         (**self).step(tick, reference, measured, model, command)
+    }
+    fn sampled(&mut self, sample: &Sample<S>) {
+        (**self).sampled(sample);
     }
     fn demand(&self, reference: &mut [S]) {
         (**self).demand(reference);

@@ -375,6 +375,7 @@ where
             *to = *from;
         }
         self.model.track(&seen, controlled);
+        self.controller.sampled(&sample);
         self.outcome = self
             .controller
             .step(

@@ -90,6 +90,8 @@ fn rate(baud: u32) -> Result<(), BuildError> {
 pub struct SafetySettings {
     /// Time without a step, s.
     pub watchdog_s: f64,
+    /// Time without a fresh measurement, s.
+    pub stale_s: f64,
     /// Time for which an input beyond `encoder_input` may turn nothing, s.
     pub encoder_s: f64,
     /// Input from which on every motor turns, in the unit of the inputs.
@@ -99,10 +101,11 @@ pub struct SafetySettings {
 }
 
 impl Default for SafetySettings {
-    /// A tenth of a second without a step; half a second of a third of 12 V without a count.
+    /// A tenth of a second without a step, a fifth without a fresh measurement; half a second of a third of 12 V without a count.
     fn default() -> Self {
         Self {
             watchdog_s: 0.1,
+            stale_s: 0.2,
             encoder_s: 0.5,
             encoder_input: 4.0,
             least_supply_v: 0.0,
@@ -136,9 +139,9 @@ impl SafetySettings {
         }
         Ok(Safety {
             watchdog_ticks: ticks("watchdog_s", self.watchdog_s)?,
-            // Who hands a measurement over, host or the robot's own sensors, has just taken it.
+            // A measurement is of this period, or older.
             stale_us: (period * 0.5e6) as u32,
-            stale_ticks: 1,
+            stale_ticks: ticks("stale_s", self.stale_s)?,
             least_supply: self.least_supply_v as f32,
             encoder_ticks: ticks("encoder_s", self.encoder_s)?,
             encoder_input: self.encoder_input as f32,
@@ -193,7 +196,7 @@ const META: PartMeta = PartMeta {
             "safety",
             "",
             "table: when the robot comes to rest by itself: `watchdog_s` without a step (default 0.1 s), \
-             `encoder_s` of an input beyond `encoder_input` that turns nothing (default 0.5 s, 4); with \
+             `stale_s` without a fresh measurement (default 0.2 s), `encoder_s` of an input beyond `encoder_input` that turns nothing (default 0.5 s, 4); with \
              `[driver.serial]` a supply below `least_supply_v` (default 0 V)",
         ),
     ],

@@ -135,6 +135,37 @@ fn a_robot_that_hangs_up_ends_the_loop() {
     );
 }
 
+/// The robot is told how old a measurement is: a few that are lost it drives over, and it comes to rest where
+/// nothing fresh comes any more.
+#[test]
+fn lost_samples_are_told() {
+    for (fault, expected) in [
+        ("{ stale = { share = 0.2 } }", None),
+        ("{ stale = { share = 1.0, start_s = 2.0 } }", Some(221)),
+    ] {
+        let (socket, thread) = robot(usize::MAX);
+        let lossy =
+            |text: String| text.replace("seed = 6", &format!("seed = 6\nfault = [{fault}]"));
+        let (_, mut composed) = compose(&socket, "model.toml", lossy).unwrap();
+        let end = (0..400).find_map(|index| {
+            let error = composed.tick(f64::from(index) * 0.01).err()?;
+            Some((index, error))
+        });
+        match (end, expected) {
+            (None, None) => {}
+            // 0.2 s of them are 20 ticks.
+            (Some((index, TickError::Control(ControlError::AtRest("stale")))), Some(at)) => {
+                assert!((at - 2..=at).contains(&index), "{index}");
+                let said = composed.host.controller.remark().unwrap();
+                assert!(said.contains("too old for too long"), "{said}");
+            }
+            other => panic!("{other:?}"),
+        }
+        drop(composed);
+        thread.join().unwrap();
+    }
+}
+
 #[test]
 fn mistakes_are_pointed_at() {
     let cases = [

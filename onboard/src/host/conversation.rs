@@ -254,17 +254,19 @@ impl Conversation {
         }
     }
 
-    /// Says a step; of a robot with sensors of its own nothing was measured here.
+    /// Says a step with a measurement so many periods old; of a robot with sensors of its own nothing was
+    /// measured here.
     pub(super) fn step(
         &mut self,
         tick: u32,
+        periods: u32,
         measured: &[f64],
         reference: &[f64],
     ) -> Result<(), LineError> {
         self.line.say(&Request::Step(Measured {
             session: self.session,
             tick,
-            age_us: 0,
+            age_us: periods.saturating_mul(self.period_us),
             supply: 0.0,
             measured: told(measured),
             reference: told(reference),

@@ -1,6 +1,6 @@
 //! A controller whose law runs at the other end of a line.
 
-use loopsight_core::{AffineModel, Command, ControlError, Controller, Tick};
+use loopsight_core::{AffineModel, Command, ControlError, Controller, Sample, Tick};
 
 use super::LineError;
 use super::conversation::Conversation;
@@ -10,6 +10,8 @@ pub(super) struct Remote {
     robot: Conversation,
     /// The next step.
     tick: u32,
+    /// Age of its measurement, periods.
+    age: u32,
     /// Parameters of the plant that the robot learns, and what it says of them.
     learned: Vec<usize>,
     estimates: Vec<f64>,
@@ -21,6 +23,7 @@ impl Remote {
         Self {
             robot,
             tick: 0,
+            age: 0,
             estimates: Vec::with_capacity(learned.len()),
             learned,
             remark: None,
@@ -35,7 +38,7 @@ impl Remote {
     ) -> Result<Command, LineError> {
         self.robot.begin()?;
         self.remark = self.robot.serve()?;
-        self.robot.step(self.tick, measured, reference)?;
+        self.robot.step(self.tick, self.age, measured, reference)?;
         let act = loop {
             let act = self.robot.act(command.len())?;
             if act.tick == self.tick {
@@ -81,6 +84,14 @@ impl Controller<f64> for Remote {
             self.remark = Some(error.to_string());
             kind
         })
+    }
+
+    fn sampled(&mut self, sample: &Sample<f64>) {
+        self.age = if sample.fresh {
+            0
+        } else {
+            self.age.saturating_add(1)
+        };
     }
 
     fn estimates(&self) -> &[f64] {

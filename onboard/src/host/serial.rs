@@ -167,7 +167,8 @@ impl Body {
         if self.tick == 0 && self.pending.is_none() {
             talk.robot.begin()?;
             // It begins where it should be at rest; the first reference is heard in its second tick.
-            talk.robot.step(0, &[], &vec![0.0; self.measured.len()])?;
+            talk.robot
+                .step(0, 0, &[], &vec![0.0; self.measured.len()])?;
         }
         let act = match self.pending.take() {
             Some(act) => act,
@@ -251,7 +252,7 @@ impl Controller<f64> for Law {
     ) -> Result<Command, ControlError> {
         let mut talk = held(&self.talk);
         let served = talk.robot.serve();
-        let step = |talk: &mut Talk| talk.robot.step(tick.index as u32, &[], reference);
+        let step = |talk: &mut Talk| talk.robot.step(tick.index as u32, 0, &[], reference);
         let said = served.and_then(|remark| step(&mut talk).map(|()| remark));
         if let Err(error) = said.map(|remark| self.remark = remark) {
             self.remark = Some(error.to_string());
