@@ -12,7 +12,7 @@ use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use loopsight_link::{Decoder, LONGEST, Reply, Request, encode};
 use loopsight_onboard::{Sensors, Twil};
@@ -32,8 +32,8 @@ pub(crate) struct Desk {
     pub(crate) loses: Vec<u32>,
     /// Supply that it measures at its ticks, V.
     pub(crate) supply: fn(u32) -> f32,
-    /// A period takes its time.
-    pub(crate) paced: bool,
+    /// Its periods are those of a clock, whether its host says something or not.
+    pub(crate) by_clock: bool,
     ticks: u32,
 }
 
@@ -69,31 +69,37 @@ impl Desk {
             steps: usize::MAX,
             loses: Vec::new(),
             supply: |_| 12.0,
-            paced: false,
+            by_clock: false,
             ticks: 0,
         }
     }
 
-    /// Answers until the line is closed. A robot with a body has its next period as soon as a step was heard,
-    /// so that tests need not wait.
+    /// Answers until the line is closed. Where it has no clock, a robot with a body has its next period as soon
+    /// as a step was heard, so that tests need not wait.
     fn serve(mut self, line: &mut (impl Read + Write)) {
         let mut requests = Decoder::default();
         let mut buffer = [0; 256];
+        let period = Duration::from_micros(PERIOD_US.into());
+        let mut next = Instant::now() + period;
         while self.steps > 0 {
+            let mut said = Vec::new();
             let length = match line.read(&mut buffer) {
                 Ok(0) => return,
                 Ok(length) => length,
-                Err(error) if error.kind() == ErrorKind::TimedOut => continue,
+                Err(error) if error.kind() == ErrorKind::TimedOut => 0,
                 Err(_) => return,
             };
-            let mut said = Vec::new();
             for byte in &buffer[..length] {
                 self.robot
                     .take(*byte, &mut |reply| said.push(reply.clone()));
                 if let Some(Ok(Request::Step(_))) = requests.take(*byte) {
                     self.steps = self.steps.saturating_sub(1);
-                    while self.period(&mut said) {}
+                    while !self.by_clock && self.period(&mut said) {}
                 }
+            }
+            while self.by_clock && Instant::now() >= next {
+                next += period;
+                self.period(&mut said);
             }
             for reply in &said {
                 let mut frame = [0; LONGEST];
@@ -110,9 +116,6 @@ impl Desk {
         let Some(body) = &mut self.body else {
             return false;
         };
-        if self.paced {
-            std::thread::sleep(Duration::from_micros(PERIOD_US.into()));
-        }
         let sensors = Sensors {
             measured: self.measured,
             supply: (self.supply)(self.ticks),
@@ -149,7 +152,8 @@ impl Desk {
     pub(crate) fn at_port(self) -> (PathBuf, JoinHandle<()>) {
         let (mut line, port) = TTYPort::pair().unwrap();
         let path = PathBuf::from(port.name().unwrap());
-        line.set_timeout(Duration::from_millis(50)).unwrap();
+        let wait = if self.by_clock { 1 } else { 50 };
+        line.set_timeout(Duration::from_millis(wait)).unwrap();
         // Kept open until the host has opened it, too: a terminal that nobody has is one that hung up.
         let thread = std::thread::spawn(move || {
             let mut first = [0];
