@@ -72,6 +72,9 @@ fn the_log_of_a_robot_at_a_serial_port_is_diagnosed() {
     let text = said(folder.path(), &["run", "loop.toml"]);
     thread.join().unwrap();
     assert!(text.contains("2000 ticks"), "{text}");
+    let log = std::fs::read_to_string(folder.path().join("log.csv")).unwrap();
+    let (names, _) = log.split_once('\n').unwrap();
+    assert!(names.ends_with("fresh_1,aboard_supply_V"), "{names}");
     let text = said(folder.path(), &["diagnose", "model.toml", "log.csv"]);
     let found = "The model lacks coulomb_friction at wheel.right and wheel.left";
     assert!(text.contains(found), "{text}");

@@ -1,6 +1,8 @@
 //! Following a path in time, around a velocity loop.
 
-use loopsight_core::{AffineModel, Command, ControlError, Controller, Real, Sample, Tick};
+use loopsight_core::{
+    AffineModel, Command, ControlError, Controller, Quantity, Real, Sample, Tick,
+};
 
 mod path;
 #[cfg(feature = "std")]
@@ -168,8 +170,12 @@ impl<S: Real, C: Controller<S>> Controller<S> for Trajectory<S, C> {
         self.velocity.sampled(sample);
     }
 
-    fn estimates(&self) -> &[S] {
-        self.velocity.estimates()
+    fn quantities(&self) -> &[Quantity<S>] {
+        self.velocity.quantities()
+    }
+
+    fn told(&self) -> &[S] {
+        self.velocity.told()
     }
 
     fn remark(&self) -> Option<&str> {

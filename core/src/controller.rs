@@ -13,6 +13,17 @@ pub struct Command {
     pub held: bool,
 }
 
+/// Something that a controller tells beside its commands: what it learned itself, what it measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quantity<S> {
+    /// Its name.
+    pub name: &'static str,
+    /// Its SI unit.
+    pub unit: &'static str,
+    /// The value it starts from, of a parameter that is learned; `None` of what is measured.
+    pub start: Option<S>,
+}
+
 /// Why a controller could not compute a command. The loop stops safely on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -107,8 +118,12 @@ pub trait Controller<S: Real>: Send {
     fn demand(&self, reference: &mut [S]) {
         let _ = reference;
     }
-    /// Values of what the controller learned itself, where it does: for logs.
-    fn estimates(&self) -> &[S] {
+    /// What the controller tells beside its commands, for logs.
+    fn quantities(&self) -> &[Quantity<S>] {
+        &[]
+    }
+    /// Values of [`Controller::quantities`] at the last step; NaN where not known.
+    fn told(&self) -> &[S] {
         &[]
     }
     /// What there is to say of the last step beyond its result: why it failed, what happened meanwhile.
@@ -137,8 +152,11 @@ impl<S: Real, C: Controller<S> + ?Sized> Controller<S> for Box<C> {
     fn demand(&self, reference: &mut [S]) {
         (**self).demand(reference);
     }
-    fn estimates(&self) -> &[S] {
-        (**self).estimates()
+    fn quantities(&self) -> &[Quantity<S>] {
+        (**self).quantities()
+    }
+    fn told(&self) -> &[S] {
+        (**self).told()
     }
     fn remark(&self) -> Option<&str> {
         (**self).remark()

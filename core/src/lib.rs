@@ -68,7 +68,7 @@ pub use channel::{Channel, Place, PlaceKind, Reads, Role};
 #[cfg(feature = "std")]
 pub use clock::SystemClock;
 pub use clock::{Clock, SimulatedClock};
-pub use controller::{AffineModel, Command, ControlError, Controller};
+pub use controller::{AffineModel, Command, ControlError, Controller, Quantity};
 pub use derived::Derived;
 pub use driver::{Driver, DriverError, DriverFault, Sample};
 #[cfg(feature = "std")]

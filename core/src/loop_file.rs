@@ -10,8 +10,8 @@ use crate::identification::{Identification, IdentificationError, LearningSetting
 use crate::limits::{self, LimitSettings};
 use crate::model::{Affine, Model, Treatment};
 use crate::registry::{
-    BuildError, ControllerPart, DriverContext, DriverPart, Estimated, EstimatorPart, HalfError,
-    HostDriver, HostDriverError,
+    BuildError, ControllerPart, DriverContext, DriverPart, EstimatorPart, HalfError, HostDriver,
+    HostDriverError,
 };
 use crate::regression::Scheme;
 use crate::supervisor::{Supervisor, SupervisorSettings};
@@ -86,8 +86,6 @@ pub struct Composed {
     target: Vec<f64>,
     /// What the controller says of its design.
     pub notes: Vec<String>,
-    /// What the controller learns itself.
-    pub estimated: Vec<Estimated>,
 }
 
 impl Composed {
@@ -262,7 +260,6 @@ impl LoopFile {
             controlled,
             references,
             notes,
-            estimated: self.controller.estimated(model),
         })
     }
 }

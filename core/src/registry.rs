@@ -229,17 +229,6 @@ pub trait EstimatorPart: Debug + Send + Sync {
     fn build(&self, theta: &[f64]) -> Result<Box<dyn Estimator<f64>>, BuildError>;
 }
 
-/// A parameter that a controller estimates itself.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Estimated {
-    /// Its name.
-    pub name: String,
-    /// Its SI unit.
-    pub unit: &'static str,
-    /// The value it starts from.
-    pub start: f64,
-}
-
 /// A controller as it stands in a file: `[controller.<id>]`.
 #[typetag::serde]
 pub trait ControllerPart: Debug + Send + Sync + Any {
@@ -249,11 +238,6 @@ pub trait ControllerPart: Debug + Send + Sync + Any {
     fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError>;
     /// Plain statements about what was asked for and what the design will give, for reports.
     fn notes(&self) -> Vec<String> {
-        Vec::new()
-    }
-    /// What [`Controller::estimates`] has values of.
-    fn estimated(&self, model: &Model) -> Vec<Estimated> {
-        let _ = model;
         Vec::new()
     }
     /// True where the controller inverts the model it is given, so that effects in the model file

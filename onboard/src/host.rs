@@ -9,11 +9,12 @@ mod open;
 mod remote;
 mod send;
 mod serial;
+mod told;
 
 use loopsight_controllers::FeedbackLinearizingPiSettings;
 use loopsight_core::identification::LearningSettings;
 use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, ControllerPart, Estimated, PartMeta, Setting};
+use loopsight_core::registry::{BuildError, ControllerPart, PartMeta, Setting};
 use loopsight_core::{Controller, declare_part};
 use loopsight_estimators::RlsSettings;
 use loopsight_link::Safety;
@@ -23,6 +24,7 @@ use conversation::Conversation;
 pub use line::{Line, LineError};
 pub use send::{Acknowledged, SendError, send};
 pub use serial::Serial;
+use told::Told;
 
 /// A law that runs aboard a robot, told to it once before its first step: model, effects, learning and law of
 /// this table.
@@ -224,7 +226,7 @@ impl ControllerPart for Aboard {
         let configuration = self.configuration(model, period)?;
         let line = Line::at(line, self.baud, self.timeout_s);
         let robot = Conversation::new(line, configuration, period).with_door(self.door.as_ref());
-        Ok(Box::new(remote::Remote::new(robot, self.learned(model))))
+        Ok(Box::new(remote::Remote::new(robot, self.told(model))))
     }
 
     fn notes(&self) -> Vec<String> {
@@ -242,29 +244,19 @@ impl ControllerPart for Aboard {
         )]
     }
 
-    fn estimated(&self, model: &Model) -> Vec<Estimated> {
-        let values = model.lower::<f64>(&model.values());
-        let of = |i: usize| Estimated {
-            name: model.plant.parameters[i].id.to_owned(),
-            unit: model.plant.parameters[i].unit,
-            start: values[i],
-        };
-        self.learned(model).into_iter().map(of).collect()
-    }
-
     fn ideal(&self, references: &[Vec<f64>], period: f64) -> Option<Vec<Vec<f64>>> {
         self.law.ideal(references, period)
     }
 }
 
 impl Aboard {
-    /// Parameters of the plant's equations that are learned aboard, by index: those that enter linearly and
-    /// that the file does not hold.
-    fn learned(&self, model: &Model) -> Vec<usize> {
+    /// What the robot tells: parameters of the plant's equations that are learned aboard, those that enter
+    /// linearly and that the file does not hold.
+    fn told(&self, model: &Model) -> Told {
         let held = |id: &str| model.parameters.iter().any(|p| p.name == id && !p.free);
         let parameters = model.plant.parameters.iter().enumerate();
         let learned = parameters.filter(|(_, p)| self.rls.is_some() && p.linear && !held(p.id));
-        learned.map(|(i, _)| i).collect()
+        Told::new(model, learned.map(|(i, _)| i).collect())
     }
 }
 

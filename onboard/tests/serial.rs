@@ -37,7 +37,7 @@ linear_velocity = { sine = { amplitude = 0.1, frequency_hz = 0.3 } }
 angular_velocity = { sine = { amplitude = 0.5, frequency_hz = 0.2 } }
 "#;
 
-const LEARNED: [&str; 6] = ["K_A", "K_B", "K_C", "K_D", "K_E", "K_F"];
+const TOLD: [&str; 7] = ["K_A", "K_B", "K_C", "K_D", "K_E", "K_F", "supply"];
 
 fn composed(line: &Path, text: &str) -> Result<Composed, String> {
     let text = text.replace('@', &line.display().to_string());
@@ -78,8 +78,9 @@ fn end_of(line: &Path, text: &str) -> String {
 fn a_robot_with_a_body_of_its_own_is_told_and_heard() {
     let (line, thread) = Desk::with_body().at_port();
     let mut composed = composed(&line, LOOP).unwrap();
-    let names: Vec<_> = composed.estimated.iter().map(|e| e.name.clone()).collect();
-    assert_eq!(names, LEARNED);
+    let quantities = composed.host.controller.quantities().to_vec();
+    let names: Vec<_> = quantities.iter().map(|q| q.name).collect();
+    assert_eq!(names, TOLD);
     let wanted =
         |time: f64| [0.1, 0.5].map(|a| a * (TAU * time * [0.3, 0.2][(a > 0.3) as usize]).sin());
     let (mut body, mut error, mut moved) = (twil::Body::default(), 0.0, 0.0);
@@ -108,12 +109,12 @@ fn a_robot_with_a_body_of_its_own_is_told_and_heard() {
     }
     assert!(error < 0.1 * moved, "{error} of {moved}");
     // The model is the robot without its friction: so it moves away from where it started.
-    let learned = composed.host.controller.estimates();
-    let moved = learned
-        .iter()
-        .zip(&composed.estimated)
-        .filter(|(v, e)| (**v - e.start).abs() > 1e-6);
-    assert_eq!(moved.count(), LEARNED.len());
+    let told = composed.host.controller.told();
+    assert_eq!(told[6], 12.0);
+    for (value, quantity) in told.iter().zip(&quantities).take(6) {
+        let start = quantity.start.unwrap();
+        assert!((value - start).abs() > 1e-6, "{}: {value}", quantity.name);
+    }
     composed.host.stop().unwrap();
     drop(composed);
     thread.join().unwrap();

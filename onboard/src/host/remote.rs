@@ -1,9 +1,10 @@
 //! A controller whose law runs at the other end of a line.
 
-use loopsight_core::{AffineModel, Command, ControlError, Controller, Sample, Tick};
+use loopsight_core::{AffineModel, Command, ControlError, Controller, Quantity, Sample, Tick};
 
 use super::LineError;
 use super::conversation::Conversation;
+use super::told::Told;
 
 /// Hands over what was measured and wanted, and takes the command.
 pub(super) struct Remote {
@@ -12,20 +13,17 @@ pub(super) struct Remote {
     tick: u32,
     /// Age of its measurement, periods.
     age: u32,
-    /// Parameters of the plant that the robot learns, and what it says of them.
-    learned: Vec<usize>,
-    estimates: Vec<f64>,
+    told: Told,
     remark: Option<String>,
 }
 
 impl Remote {
-    pub(super) fn new(robot: Conversation, learned: Vec<usize>) -> Self {
+    pub(super) fn new(robot: Conversation, told: Told) -> Self {
         Self {
             robot,
             tick: 0,
             age: 0,
-            estimates: Vec::with_capacity(learned.len()),
-            learned,
+            told,
             remark: None,
         }
     }
@@ -48,9 +46,7 @@ impl Remote {
         for (to, from) in command.iter_mut().zip(&act.command) {
             *to = f64::from(*from);
         }
-        self.estimates.clear();
-        let learned = self.learned.iter().filter_map(|i| act.parameters.get(*i));
-        self.estimates.extend(learned.map(|v| f64::from(*v)));
+        self.told.take(&act);
         self.tick = self.tick.wrapping_add(1);
         Ok(Command {
             saturated: act.saturated,
@@ -94,8 +90,12 @@ impl Controller<f64> for Remote {
         };
     }
 
-    fn estimates(&self) -> &[f64] {
-        &self.estimates
+    fn quantities(&self) -> &[Quantity<f64>] {
+        self.told.quantities()
+    }
+
+    fn told(&self) -> &[f64] {
+        self.told.values()
     }
 
     fn remark(&self) -> Option<&str> {

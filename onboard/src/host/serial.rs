@@ -8,13 +8,15 @@ use loopsight_core::registry::{
     HostDriverError, PartMeta, Setting,
 };
 use loopsight_core::{
-    AffineModel, Command, ControlError, Controller, Driver, DriverFault, Sample, Tick, declare_part,
+    AffineModel, Command, ControlError, Controller, Driver, DriverFault, Quantity, Sample, Tick,
+    declare_part,
 };
 use loopsight_link::Act;
 use serde::{Deserialize, Serialize};
 
 use super::conversation::Conversation;
 use super::remote::kind;
+use super::told::Told;
 use super::{Aboard, Line, LineError, baud, rate, timeout, waits};
 
 /// A robot with motors and encoders of its own, which runs its loop by its own timer: the host tells it what
@@ -124,12 +126,10 @@ impl DriverPart for Serial {
             pending: None,
             measured: vec![0.0; n],
         };
-        let learned = aboard.learned(model);
         let law = Law {
             talk,
             followed: vec![0.0; n],
-            estimates: Vec::with_capacity(learned.len()),
-            learned,
+            told: aboard.told(model).with_supply(),
             remark: None,
         };
         Ok((Box::new(body), Box::new(law)))
@@ -236,8 +236,7 @@ struct Law {
     talk: Arc<Mutex<Talk>>,
     /// The reference that the robot followed.
     followed: Vec<f64>,
-    learned: Vec<usize>,
-    estimates: Vec<f64>,
+    told: Told,
     remark: Option<String>,
 }
 
@@ -268,9 +267,7 @@ impl Controller<f64> for Law {
         for (to, from) in self.followed.iter_mut().zip(followed) {
             *to = f64::from(*from);
         }
-        self.estimates.clear();
-        let learned = self.learned.iter().filter_map(|i| act.parameters.get(*i));
-        self.estimates.extend(learned.map(|v| f64::from(*v)));
+        self.told.take(act);
         Ok(Command {
             saturated: act.saturated,
             held: act.held,
@@ -281,8 +278,12 @@ impl Controller<f64> for Law {
         reference.copy_from_slice(&self.followed);
     }
 
-    fn estimates(&self) -> &[f64] {
-        &self.estimates
+    fn quantities(&self) -> &[Quantity<f64>] {
+        self.told.quantities()
+    }
+
+    fn told(&self) -> &[f64] {
+        self.told.values()
     }
 
     fn remark(&self) -> Option<&str> {

@@ -124,8 +124,11 @@ impl Recorder {
             }
         }
         let identified = parameters.len();
-        for own in &composed.estimated {
-            starts.push(own.start);
+        for own in composed.host.controller.quantities() {
+            let Some(start) = own.start else {
+                continue;
+            };
+            starts.push(start);
             parameters.push(ParameterTrace {
                 name: format!("{} aboard", own.name),
                 unit: own.unit.to_owned(),
@@ -180,8 +183,8 @@ impl Recorder {
         for p in &self.record.parameters[..self.identified] {
             headers.push(named("learned", &p.name, &p.unit));
         }
-        for own in &composed.estimated {
-            headers.push(named("aboard", &own.name, own.unit));
+        for own in composed.host.controller.quantities() {
+            headers.push(named("aboard", own.name, own.unit));
         }
         for i in &self.record.innovations {
             headers.push(named("innovation", &i.id, &i.unit));
@@ -287,14 +290,16 @@ impl Recorder {
                 }
             }
         }
-        let aboard = composed.host.controller.estimates();
-        for own in 0..composed.estimated.len() {
-            let value = aboard.get(own).copied().unwrap_or(f64::NAN);
-            self.row.push(value);
-            self.estimates[self.identified + own] = value;
-            if keeps {
-                let trace = &mut self.record.parameters[self.identified + own];
-                trace.values.push(value);
+        let controller = &composed.host.controller;
+        let mut next = self.identified;
+        for (own, value) in controller.quantities().iter().zip(controller.told()) {
+            self.row.push(*value);
+            if own.start.is_some() {
+                self.estimates[next] = *value;
+                if keeps {
+                    self.record.parameters[next].values.push(*value);
+                }
+                next += 1;
             }
         }
         if let Some(identification) = &composed.host.observer {
