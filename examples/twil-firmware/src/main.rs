@@ -2,11 +2,14 @@
 //! itself when it must.
 //!
 //! All that decides anything is in `loopsight-onboard`, which runs on a desk, too. Here is a board: bytes from a
-//! serial line, a timer of 100 Hz, and what they cost.
+//! serial line, a timer of 100 Hz, and what they cost. With the feature `body` there are motors and encoders, too:
+//! those of a robot that the board simulates.
 
 #![no_std]
 #![no_main]
 
+#[cfg(feature = "body")]
+mod body;
 mod mps2;
 
 use core::panic::PanicInfo;
@@ -31,6 +34,11 @@ fn main() -> ! {
             line.write(&buffer[..length]);
         }
     };
+    #[cfg(feature = "body")]
+    let mut body = body::Body::default();
+    #[cfg(feature = "body")]
+    let mut robot = Twil::with_sensors(PERIOD_US, meter);
+    #[cfg(not(feature = "body"))]
     let mut robot = Twil::new(PERIOD_US, meter);
     say(&Reply::Log(Note::Started));
     loop {
@@ -38,6 +46,12 @@ fn main() -> ! {
             robot.take(byte, &mut say);
         }
         if mps2::period_is_over() {
+            #[cfg(feature = "body")]
+            {
+                robot.sensed(Some(body.sensors()), &mut say);
+                body.drive(robot.output());
+            }
+            #[cfg(not(feature = "body"))]
             robot.elapsed(&mut say);
         }
         mps2::sleep();

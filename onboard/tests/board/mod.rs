@@ -38,8 +38,13 @@ pub(crate) struct Board {
 impl Board {
     /// Switches a board on and waits for what it says first.
     pub(crate) fn start() -> Self {
-        let firmware = std::env::var("LOOPSIGHT_FIRMWARE")
-            .expect("LOOPSIGHT_FIRMWARE names the firmware, built as its README says");
+        Self::with("LOOPSIGHT_FIRMWARE")
+    }
+
+    /// The same with the firmware that this variable names.
+    pub(crate) fn with(variable: &str) -> Self {
+        let firmware = std::env::var(variable)
+            .unwrap_or_else(|_| panic!("{variable} names the firmware, built as its README says"));
         static BOARDS: AtomicU32 = AtomicU32::new(0);
         let number = BOARDS.fetch_add(1, Ordering::Relaxed);
         let name = format!("loopsight-{}-{number}.line", std::process::id());
