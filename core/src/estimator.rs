@@ -33,11 +33,25 @@ pub trait Estimator<S: Real>: Send {
     /// A sample with NaN or infinity, or a regressor of another length, leaves the estimate as it
     /// is and comes back with `accepted` false.
     fn update(&mut self, regressor: &[S], measurement: S) -> Innovation<S>;
+    /// The same, where the innovation is known, or another one is to be learned from: the measurement is
+    /// what the estimate predicts, and `innovation`.
+    fn correct(&mut self, regressor: &[S], innovation: S) -> Innovation<S> {
+        let known = regressor.iter().zip(self.theta());
+        let known = known.fold(S::zero(), |sum, (phi, theta)| sum + *phi * *theta);
+        self.update(regressor, known + innovation)
+    }
     /// The estimate.
     fn theta(&self) -> &[S];
-    /// Its covariance relative to the variance of the measurement noise, column by column; NaN where
-    /// the method has none.
-    fn covariance(&self) -> &[S];
+    /// The covariance of two of its entries relative to the variance of the measurement noise; NaN where
+    /// the method has none. Computed when it is asked for: a tick does not pay for what nobody looks at.
+    fn covariance(&self, row: usize, column: usize) -> S;
+    /// All of it, column by column; `into` has the square of the estimate's length.
+    fn covariance_into(&self, into: &mut [S]) {
+        let n = self.theta().len();
+        for (k, entry) in into.iter_mut().enumerate() {
+            *entry = self.covariance(k % n, k / n);
+        }
+    }
     /// Moves the estimate and leaves the covariance as it is: who guards the estimator holds it in
     /// range by this. Ignored unless `theta` has the right length and is finite.
     fn set_theta(&mut self, theta: &[S]);
@@ -50,11 +64,14 @@ impl<S: Real, E: Estimator<S> + ?Sized> Estimator<S> for Box<E> {
     fn update(&mut self, regressor: &[S], measurement: S) -> Innovation<S> {
         (**self).update(regressor, measurement)
     }
+    fn correct(&mut self, regressor: &[S], innovation: S) -> Innovation<S> {
+        (**self).correct(regressor, innovation)
+    }
     fn theta(&self) -> &[S] {
         (**self).theta()
     }
-    fn covariance(&self) -> &[S] {
-        (**self).covariance()
+    fn covariance(&self, row: usize, column: usize) -> S {
+        (**self).covariance(row, column)
     }
     fn set_theta(&mut self, theta: &[S]) {
         (**self).set_theta(theta);

@@ -138,18 +138,15 @@ impl Default for Guards {
     }
 }
 
-/// Share of the least excitation below which a direction counts as absent.
-const ABSENT: f64 = 0.1;
-
 /// An estimator that works in scaled parameters, learns only when a sample is worth it, and stays
 /// in range.
 ///
 /// ```text
 /// θ_i = s_i ϑ_i      ψ_i = s_i φ_i      y = ψᵀϑ      e = y - ψᵀϑ̂
-/// M ← M + (ψψᵀ - M)/W      M = Q diag(m) Qᵀ                              excitation
+/// M ← M + (ψψᵀ - M)/W      QᵀM Q ≈ diag(m)                               excitation
 /// ψ' = Σ q_i q_iᵀψ over the i with √m_i ≥ m₀; nothing is learned where |ψ'| < m₀
 /// e' = e - δ sign e where |e| > δ, else nothing is learned              dead zone
-/// the estimator takes  y' = ψ'ᵀϑ̂ + e'  with  ψ'; of the change of ϑ̂, the part along q_i with √m_i ≥ m₀/10
+/// the estimator takes  ψ'  and  e';  of the change of ϑ̂, the part along q_i with √m_i ≥ m₀/10
 /// ϑ̂ ← arg min (ϑ - ϑ̂)ᵀ P⁻¹ (ϑ - ϑ̂)  subject to  low ≤ s ϑ ≤ high        projection
 /// ```
 ///
@@ -157,7 +154,7 @@ const ABSENT: f64 = 0.1;
 /// |---|---|---|
 /// | `y`, `e` | left-hand side of the regression, innovation | unit of `y` |
 /// | `θ_i`, `s_i` | parameter and its declared scale | of the parameter |
-/// | `M`, `m_i`, `W` | information per sample, its eigenvalues, window | unit of `y²`, samples |
+/// | `M`, `m_i`, `W` | information per sample, its eigenvalues to some percent, window | unit of `y²`, samples |
 /// | `m₀`, `δ` | least excitation, dead zone | unit of `y` |
 /// | `P` | covariance of `ϑ̂` over the variance of the noise | 1/unit of `y²` |
 ///
@@ -188,19 +185,21 @@ where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
     estimator: E,
-    guards: Guards,
     information: Information<S, D>,
+    dead_zone: S,
+    window: S,
     scale: OVector<S, D>,
     /// In the parameters' units.
     bounds: [OVector<S, D>; 2],
     /// In scales.
     scaled_bounds: [OVector<S, D>; 2],
     theta: OVector<S, D>,
-    covariance: OMatrix<S, D, D>,
     noise: S,
     lessons: S,
     /// `ψ`, then `ψ'`, changes or `ϑ`; `ϑ` before the update; scratch.
     work: [OVector<S, D>; 3],
+    /// Scratch: the covariance of `ϑ`.
+    covariance: OMatrix<S, D, D>,
 }
 
 impl<S: Real, E: Estimator<S>, D: Dim> Guarded<S, E, D>
@@ -208,8 +207,8 @@ where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
     /// Guards `estimator`, whose parameters are those of `ranges` over their scales; it starts over
-    /// from `theta`, in the parameters' units. `None` when the lengths differ, a scale is not above 0,
-    /// a range is empty or a guard is negative.
+    /// from `theta`, in the parameters' units. `None` when there are no parameters, the lengths differ, a
+    /// scale is not above 0, a range is empty or a guard is negative.
     pub fn new(
         estimator: E,
         theta: OVector<S, D>,
@@ -217,7 +216,7 @@ where
         guards: Guards,
     ) -> Option<Self> {
         let n = theta.len();
-        let fits = n == ranges.len() && n == estimator.theta().len();
+        let fits = n > 0 && n == ranges.len() && n == estimator.theta().len();
         let usable = |r: &Range<S>| r.scale > S::zero() && r.scale.is_finite() && r.low <= r.high;
         let guards_hold =
             guards.dead_zone >= 0.0 && guards.least_excitation >= 0.0 && guards.window >= 1.0;
@@ -231,16 +230,17 @@ where
         let zero = OVector::zeros_generic(dim, one);
         let mut guarded = Self {
             estimator,
-            information: Information::new(dim, guards.window),
-            guards,
+            information: Information::new(dim, guards.window, guards.least_excitation),
+            dead_zone: S::of(guards.dead_zone),
+            window: S::of(guards.window),
             scale: of(&|r| r.scale),
             bounds: [of(&|r| r.low), of(&|r| r.high)],
             scaled_bounds: [of(&|r| r.low / r.scale), of(&|r| r.high / r.scale)],
             theta: zero.clone(),
-            covariance: OMatrix::zeros_generic(dim, dim),
             noise: S::zero(),
             lessons: S::zero(),
             work: [zero.clone(), zero.clone(), zero],
+            covariance: OMatrix::zeros_generic(dim, dim),
         };
         guarded.reset(theta.as_slice());
         Some(guarded)
@@ -257,13 +257,15 @@ where
         if regressor.len() != self.theta.len() {
             return Lesson::none(Withheld::NotFinite);
         }
-        let [psi, _, scratch] = &mut self.work;
+        let [psi, before, _] = &mut self.work;
+        let (psi, theta) = (psi.as_mut_slice(), self.estimator.theta());
         let mut innovation = measurement;
-        for (i, phi) in regressor.iter().enumerate() {
-            psi[i] = *phi * self.scale[i];
-            innovation -= psi[i] * self.estimator.theta()[i];
+        for (i, theta) in theta.iter().enumerate() {
+            psi[i] = regressor[i] * self.scale[i];
+            innovation -= psi[i] * *theta;
         }
-        if !innovation.is_finite() || psi.iter().any(|v| !v.is_finite()) {
+        // What is not finite in the regressor leaves nothing finite here.
+        if !innovation.is_finite() {
             return Lesson::none(Withheld::NotFinite);
         }
         let mut lesson = Lesson {
@@ -274,68 +276,73 @@ where
         if withheld.is_some() {
             return lesson;
         }
-        if !self.information.take(psi.as_slice()) {
+        let Some(square) = self.information.take(psi) else {
             lesson.withheld = Some(Withheld::NotFinite);
             return lesson;
-        }
-        let least = S::of(self.guards.least_excitation);
-        let (psi, scratch) = (psi.as_mut_slice(), scratch.as_mut_slice());
-        self.information.part(psi, least, scratch);
-        let square = psi.iter().fold(S::zero(), |sum, v| sum + *v * *v);
-        if square < least * least || square == S::zero() {
+        };
+        let square = self.information.excited(psi, square);
+        if square < self.information.floor() || square == S::zero() {
             lesson.withheld = Some(Withheld::Unexcited);
             return lesson;
         }
-        let zone = S::of(self.guards.dead_zone);
+        let zone = self.dead_zone;
         if innovation.abs() <= zone && zone > S::zero() {
             lesson.withheld = Some(Withheld::DeadZone);
             return lesson;
         }
         let beyond = innovation - innovation.held(-zone, zone);
-        let known =
-            (psi.iter().zip(self.estimator.theta())).fold(S::zero(), |sum, (p, t)| sum + *p * *t);
-        self.work[1]
-            .as_mut_slice()
-            .copy_from_slice(self.estimator.theta());
-        let told = self
-            .estimator
-            .update(self.work[0].as_slice(), known + beyond);
+        let hidden = self.information.hides();
+        if hidden {
+            before.as_mut_slice().copy_from_slice(theta);
+        }
+        let told = self.estimator.correct(psi, beyond);
         if !told.accepted {
             lesson.withheld = Some(Withheld::NotFinite);
             return lesson;
         }
-        self.turn_back(least * S::of(ABSENT));
+        if hidden {
+            self.turn_back();
+        }
         lesson.relative_variance = told.relative_variance;
-        self.lessons = (self.lessons + S::one()).smaller(S::of(self.guards.window));
+        self.lessons = (self.lessons + S::one()).smaller(self.window);
         let square = innovation * innovation / told.relative_variance;
         self.noise += (square - self.noise) / self.lessons;
         lesson.projected = self.hold();
         lesson
     }
 
-    /// Undoes what the update moved along directions that are excited less than `least`.
-    fn turn_back(&mut self, least: S) {
+    /// Undoes what the update moved along directions that are as good as absent.
+    fn turn_back(&mut self) {
         let [change, before, scratch] = &mut self.work;
         for (i, now) in self.estimator.theta().iter().enumerate() {
             change[i] = *now - before[i];
         }
-        let (change, scratch) = (change.as_mut_slice(), scratch.as_mut_slice());
-        if self.information.part(change, least, scratch) {
-            for (to, by) in before.iter_mut().zip(change.iter()) {
-                *to += *by;
-            }
-            self.estimator.set_theta(before.as_slice());
+        let change = change.as_mut_slice();
+        self.information.present(change, scratch.as_mut_slice());
+        for (to, by) in before.iter_mut().zip(change.iter()) {
+            *to += *by;
         }
+        self.estimator.set_theta(before.as_slice());
     }
 
-    /// Brings the estimate into its range, and shows it in the parameters' units.
+    /// Shows the estimate in the parameters' units, and brings it into its range where it is not; true
+    /// where it was not.
     fn hold(&mut self) -> bool {
+        !self.show() && self.bring_back()
+    }
+
+    /// Brings an estimate that does not show within its range into it; true where it was outside, and not
+    /// only by rounding.
+    #[cold]
+    fn bring_back(&mut self) -> bool {
+        self.estimator
+            .covariance_into(self.covariance.as_mut_slice());
         let [theta, _, multipliers] = &mut self.work;
         theta.as_mut_slice().copy_from_slice(self.estimator.theta());
         let [low, high] = &self.scaled_bounds;
         let projected = into_box(
             theta.as_mut_slice(),
-            self.estimator.covariance(),
+            self.covariance.as_slice(),
             low.as_slice(),
             high.as_slice(),
             multipliers.as_mut_slice(),
@@ -343,17 +350,25 @@ where
         if projected {
             self.estimator.set_theta(theta.as_slice());
         }
-        let n = self.theta.len();
-        for i in 0..n {
-            let value = self.estimator.theta()[i] * self.scale[i];
-            // The product may round across the bound.
-            self.theta[i] = value.held(self.bounds[0][i], self.bounds[1][i]);
-            for j in 0..n {
-                self.covariance[(i, j)] =
-                    self.estimator.covariance()[j * n + i] * self.scale[i] * self.scale[j];
-            }
+        self.show();
+        // The product with the scale may round across the bound.
+        let [low, high] = &self.bounds;
+        for (value, (low, high)) in self.theta.iter_mut().zip(low.iter().zip(high.iter())) {
+            *value = value.held(*low, *high);
         }
         projected
+    }
+
+    /// Shows the estimate in the parameters' units; whether that is within its range.
+    fn show(&mut self) -> bool {
+        let [low, high] = &self.bounds;
+        let mut within = true;
+        for (i, value) in self.estimator.theta().iter().enumerate() {
+            let value = *value * self.scale[i];
+            within &= value >= low[i] && value <= high[i];
+            self.theta[i] = value;
+        }
+        within
     }
 
     /// The estimate, in the parameters' units, within its range.
@@ -361,9 +376,10 @@ where
         self.theta.as_slice()
     }
 
-    /// Covariance over the variance of the noise, column by column, in the parameters' units.
-    pub fn covariance(&self) -> &[S] {
-        self.covariance.as_slice()
+    /// Covariance of two parameters over the variance of the noise, in their units; NaN where the
+    /// estimator has none.
+    pub fn covariance(&self, row: usize, column: usize) -> S {
+        self.estimator.covariance(row, column) * self.scale[row] * self.scale[column]
     }
 
     /// Variance of the noise in `y`, from the innovations of the window that taught something.
@@ -374,7 +390,7 @@ where
     /// Standard deviation of the `i`-th parameter, as far as the noise is white; NaN where the estimator
     /// has no covariance.
     pub fn deviation(&self, i: usize) -> S {
-        (self.noise * self.covariance[(i, i)]).sqrt()
+        (self.noise * self.covariance(i, i)).sqrt()
     }
 
     /// By how much `y` changes, rms over the window, when the parameters change by one scale in the

@@ -80,9 +80,7 @@ pub(crate) fn fit(
         let quantile = StudentsT::new(0.0, 1.0, dof).map_or(1.96, |t| t.inverse_cdf(0.975));
         for (k, j) in regression.parameters(row).iter().enumerate() {
             let theta = estimator.theta()[k];
-            let error = (variance * estimator.covariance()[k * n + k])
-                .max(0.0)
-                .sqrt();
+            let error = (variance * estimator.covariance(k, k)).max(0.0).sqrt();
             values[*j] = theta;
             found.insert(*j, (theta, error, quantile));
         }

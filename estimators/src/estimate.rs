@@ -2,7 +2,7 @@
 
 use loopsight_core::Real;
 use nalgebra::allocator::Allocator;
-use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
+use nalgebra::{DefaultAllocator, Dim, OVector};
 
 use crate::factor::Factor;
 
@@ -14,8 +14,6 @@ where
 {
     theta: OVector<S, D>,
     next: OVector<S, D>,
-    /// What [`Estimate::covariance`] shows.
-    p: OMatrix<S, D, D>,
     pub(crate) factor: Factor<S, D>,
     initial: S,
     /// Greatest diagonal entry of `P`, less what rounding may add to it.
@@ -32,7 +30,6 @@ where
         let factor = Factor::new(dim);
         let mut estimate = Self {
             next: theta.clone(),
-            p: OMatrix::zeros_generic(dim, dim),
             cap: factor.shown_below(S::of(limit)),
             factor,
             initial: S::of(initial),
@@ -45,7 +42,6 @@ where
     /// The covariance as in the beginning.
     pub(crate) fn restart(&mut self) {
         self.factor.restart(self.initial.smaller(self.cap));
-        self.show();
     }
 
     /// `y - φᵀθ`.
@@ -64,24 +60,22 @@ where
         for (i, next) in self.next.iter_mut().enumerate() {
             *next = self.theta[i] + self.factor.gain(i) * step;
         }
-        let finite = self.next.iter().all(|v| v.is_finite());
+        // A sum is finite where all of it is; one that is too large is refused as well.
+        let sum = self.next.iter().fold(S::zero(), |sum, v| sum + *v);
+        let finite = sum.is_finite();
         if finite {
             self.theta.copy_from(&self.next);
         }
         finite
     }
 
-    /// Brings what [`Estimate::covariance`] shows up to date.
-    pub(crate) fn show(&mut self) {
-        self.factor.show(self.p.as_mut_slice());
-    }
-
     pub(crate) fn theta(&self) -> &[S] {
         self.theta.as_slice()
     }
 
-    pub(crate) fn covariance(&self) -> &[S] {
-        self.p.as_slice()
+    /// An entry of `P`.
+    pub(crate) fn covariance(&self, row: usize, column: usize) -> S {
+        self.factor.entry(row, column)
     }
 
     /// As [`set`].
@@ -111,6 +105,15 @@ pub(crate) fn set<S: Real>(theta: &mut [S], to: &[S]) -> bool {
         theta.copy_from_slice(to);
     }
     fits
+}
+
+/// All entries of a covariance, to compare.
+#[cfg(test)]
+pub(crate) fn covariance<S: Real>(of: &impl loopsight_core::Estimator<S>) -> std::vec::Vec<S> {
+    let n = of.theta().len();
+    let mut p = std::vec![S::zero(); n * n];
+    of.covariance_into(&mut p);
+    p
 }
 
 /// The settings of an estimate with its covariance, as `rls` and `kalman` declare them.

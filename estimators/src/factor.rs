@@ -46,7 +46,7 @@ where
         }
     }
 
-    /// The greatest diagonal entry `p` so that what [`Factor::show`] shows of it stays at `limit`.
+    /// The greatest diagonal entry `p` so that what [`Factor::entry`] says of it stays at `limit`.
     pub(crate) fn shown_below(&self, limit: S) -> S {
         limit / (self.enlargement + self.enlargement - S::one())
     }
@@ -165,6 +165,18 @@ where
     /// Holds each diagonal entry of `P` at `cap`: `P⁻¹ ← P⁻¹ + (1/cap - 1/P_ii) e_i e_iᵀ`.
     pub(crate) fn bound(&mut self, cap: S) {
         let n = self.d.len();
+        let mut beyond = false;
+        for i in 0..n {
+            beyond |= self.variance(i) > cap;
+        }
+        if beyond {
+            self.cut(cap);
+        }
+    }
+
+    #[cold]
+    fn cut(&mut self, cap: S) {
+        let n = self.d.len();
         for i in 0..n {
             let variance = self.variance(i);
             if variance > cap {
@@ -182,23 +194,18 @@ where
         }
     }
 
-    /// `P`, column by column: rounded once more, its diagonal enlarged by more than what those
-    /// roundings and a Cholesky factorisation can take away (Higham 2002, theorem 10.7), so that it is
-    /// positive definite, and exactly symmetric. The enlargement is not fed back.
-    pub(crate) fn show(&self, p: &mut [S]) {
+    /// An entry of `P`: rounded once more, the diagonal enlarged by more than what those roundings and a
+    /// Cholesky factorisation can take away (Higham 2002, theorem 10.7), so that the whole is positive
+    /// definite, and exactly symmetric. The enlargement is not fed back.
+    pub(crate) fn entry(&self, row: usize, column: usize) -> S {
         let (u, d) = (self.u.as_slice(), self.d.as_slice());
         let n = d.len();
-        for j in 0..n {
-            for i in 0..=j {
-                let mut sum = if i == j { d[j] } else { u[j * n + i] * d[j] };
-                for k in j + 1..n {
-                    sum += u[k * n + i] * d[k] * u[k * n + j];
-                }
-                p[j * n + i] = sum;
-                p[i * n + j] = sum;
-            }
-            p[j * n + j] *= self.enlargement;
+        let (i, j) = (row.min(column), row.max(column));
+        let mut sum = if i == j { d[j] } else { u[j * n + i] * d[j] };
+        for k in j + 1..n {
+            sum += u[k * n + i] * d[k] * u[k * n + j];
         }
+        if i == j { sum * self.enlargement } else { sum }
     }
 }
 
@@ -223,10 +230,9 @@ mod tests {
         factor.restart(2.0);
         let mut full = Matrix3::identity() * 2.0;
         let close = |factor: &Factor<f64, Const<3>>, full: &Matrix3<f64>| {
-            let mut shown = [0.0; 9];
-            factor.show(&mut shown);
-            for (a, b) in shown.iter().zip(full.as_slice()) {
-                assert!((a - b).abs() < 1e-12, "{shown:?} {full}");
+            for (i, j) in (0..9).map(|k| (k % 3, k / 3)) {
+                let (a, b) = (factor.entry(i, j), full[(i, j)]);
+                assert!((a - b).abs() < 1e-12, "{i}, {j}: {a} {full}");
             }
         };
         for k in 0..30 {

@@ -2,7 +2,7 @@
 
 use loopsight_core::{Estimator, Innovation, Real};
 use nalgebra::allocator::Allocator;
-use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector};
+use nalgebra::{DefaultAllocator, Dim, OVector};
 
 use crate::estimate::{error, is_start, set};
 
@@ -50,12 +50,11 @@ pub use settings::{LmsError, LmsSettings};
 #[derive(Clone, Debug)]
 pub struct Lms<S: Real, D: Dim>
 where
-    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+    DefaultAllocator: Allocator<D>,
 {
     theta: OVector<S, D>,
     start: OVector<S, D>,
     next: OVector<S, D>,
-    none: OMatrix<S, D, D>,
     step: S,
     leakage: S,
     regularization: S,
@@ -63,7 +62,7 @@ where
 
 impl<S: Real, D: Dim> Lms<S, D>
 where
-    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+    DefaultAllocator: Allocator<D>,
 {
     /// An estimator that starts from `theta`.
     pub fn new(theta: OVector<S, D>, settings: &LmsSettings) -> Result<Self, LmsError> {
@@ -71,11 +70,9 @@ where
         if !is_start(theta.as_slice()) {
             return Err(LmsError::Theta);
         }
-        let (dim, _) = theta.shape_generic();
         Ok(Self {
             start: theta.clone(),
             next: theta.clone(),
-            none: OMatrix::from_element_generic(dim, dim, S::of(f64::NAN)),
             theta,
             step: S::of(settings.step),
             leakage: S::of(settings.leakage),
@@ -86,15 +83,18 @@ where
 
 impl<S: Real, D: Dim> Estimator<S> for Lms<S, D>
 where
-    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+    DefaultAllocator: Allocator<D>,
     OVector<S, D>: Send,
-    OMatrix<S, D, D>: Send,
 {
     fn update(&mut self, regressor: &[S], measurement: S) -> Innovation<S> {
+        let innovation = error(self.theta.as_slice(), regressor, measurement);
+        self.correct(regressor, innovation)
+    }
+
+    fn correct(&mut self, regressor: &[S], innovation: S) -> Innovation<S> {
         if regressor.len() != self.theta.len() {
             return Innovation::refused();
         }
-        let innovation = error(self.theta.as_slice(), regressor, measurement);
         let power = (regressor.iter()).fold(self.regularization, |sum, phi| sum + *phi * *phi);
         let gain = self.step * innovation / power;
         for (i, next) in self.next.iter_mut().enumerate() {
@@ -116,8 +116,8 @@ where
         self.theta.as_slice()
     }
 
-    fn covariance(&self) -> &[S] {
-        self.none.as_slice()
+    fn covariance(&self, _row: usize, _column: usize) -> S {
+        S::of(f64::NAN)
     }
 
     fn set_theta(&mut self, theta: &[S]) {
@@ -203,7 +203,7 @@ mod tests {
         lms.set_theta(&[f32::NAN, 0.0]);
         lms.reset(&[1.0]);
         assert_eq!(lms.theta(), before);
-        assert!(lms.covariance().iter().all(|v| v.is_nan()));
+        assert!(lms.covariance(0, 0).is_nan());
     }
 
     #[test]

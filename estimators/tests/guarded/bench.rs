@@ -108,11 +108,14 @@ impl<S: Real> Estimator<S> for Any<S> {
     fn update(&mut self, regressor: &[S], measurement: S) -> Innovation<S> {
         self.inner_mut().update(regressor, measurement)
     }
+    fn correct(&mut self, regressor: &[S], innovation: S) -> Innovation<S> {
+        self.inner_mut().correct(regressor, innovation)
+    }
     fn theta(&self) -> &[S] {
         self.inner().theta()
     }
-    fn covariance(&self) -> &[S] {
-        self.inner().covariance()
+    fn covariance(&self, row: usize, column: usize) -> S {
+        self.inner().covariance(row, column)
     }
     fn set_theta(&mut self, theta: &[S]) {
         self.inner_mut().set_theta(theta);
@@ -181,8 +184,14 @@ impl Robot {
     }
 }
 
+/// All entries of a covariance, column by column.
+pub(crate) fn covariance<S: Real>(of: impl Fn(usize, usize) -> S) -> [S; 9] {
+    core::array::from_fn(|k| of(k % 3, k / 3))
+}
+
 /// Symmetric, and positive definite by a Cholesky factorisation in the scalar itself.
-pub(crate) fn is_covariance<S: Real>(p: &[S]) -> bool {
+pub(crate) fn is_covariance<S: Real>(estimator: &impl Estimator<S>) -> bool {
+    let p = covariance(|i, j| estimator.covariance(i, j));
     let mut l = [[S::zero(); 3]; 3];
     for i in 0..3 {
         for j in 0..=i {

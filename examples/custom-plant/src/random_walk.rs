@@ -137,8 +137,8 @@ impl Estimator<f64> for Filter {
         &self.theta
     }
 
-    fn covariance(&self) -> &[f64] {
-        &self.covariance
+    fn covariance(&self, row: usize, column: usize) -> f64 {
+        self.covariance[column * self.theta.len() + row]
     }
 
     fn set_theta(&mut self, theta: &[f64]) {
@@ -197,6 +197,6 @@ mod tests {
             .iter()
             .fold((0.0, 0.0), |s, (x, y)| (s.0 + x * y, s.1 + x * x));
         assert!((filter.theta()[0] - xy / xx).abs() < 1e-9);
-        assert!((filter.covariance()[0] * xx - 1.0).abs() < 1e-9);
+        assert!((filter.covariance(0, 0) * xx - 1.0).abs() < 1e-9);
     }
 }

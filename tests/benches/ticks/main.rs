@@ -40,11 +40,10 @@ wheel_radius = 0.05
 const FORGETTING: f64 = 0.99;
 const LIMIT: f64 = 1e6;
 
-/// The update of `Rls` by hand, for three parameters: the same factored covariance, checks, bound
-/// and symmetric result, on plain arrays.
+/// The update of `Rls` by hand, for three parameters: the same factored covariance, checks and bound, on
+/// plain arrays.
 struct ByHand {
     theta: [f64; 3],
-    p: [[f64; 3]; 3],
     u: [[f64; 3]; 3],
     d: [f64; 3],
     cap: f64,
@@ -56,7 +55,6 @@ impl ByHand {
         let slack = 36.0 * f64::EPSILON / 2.0;
         Self {
             theta: [0.0; 3],
-            p: [[0.0; 3]; 3],
             u: [[0.0; 3]; 3],
             d: [LIMIT / (1.0 + 2.0 * slack); 3],
             cap: LIMIT / (1.0 + 2.0 * slack),
@@ -128,6 +126,12 @@ impl ByHand {
                 self.absorb(&f, &v, self.cap * (variance / (variance - self.cap)), 1.0);
             }
         }
+        (innovation, 1.0 + spread, true)
+    }
+
+    /// The covariance, column by column.
+    fn covariance(&self) -> [f64; 9] {
+        let mut p = [0.0; 9];
         for j in 0..3 {
             for i in 0..=j {
                 let mut sum = if i == j {
@@ -138,12 +142,14 @@ impl ByHand {
                 for k in j + 1..3 {
                     sum += self.u[i][k] * self.d[k] * self.u[j][k];
                 }
-                self.p[i][j] = sum;
-                self.p[j][i] = sum;
+                if i == j {
+                    sum *= self.enlargement;
+                }
+                p[3 * i + j] = sum;
+                p[3 * j + i] = sum;
             }
-            self.p[j][j] *= self.enlargement;
         }
-        (innovation, 1.0 + spread, true)
+        p
     }
 }
 
@@ -303,7 +309,9 @@ fn estimator(criterion: &mut Criterion, ratios: bool) {
         by_hand.update(phi, *y);
     }
     assert_eq!(fixed.theta(), by_hand.theta);
-    assert_eq!(fixed.covariance(), by_hand.p.as_flattened());
+    let mut covariance = [0.0; 9];
+    fixed.covariance_into(&mut covariance);
+    assert_eq!(covariance, by_hand.covariance());
 
     if ratios {
         println!("one RLS update, three parameters (ratio to the last line)");
