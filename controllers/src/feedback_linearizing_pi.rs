@@ -224,10 +224,14 @@ where
         command: &mut [S],
     ) -> Result<Command, ControlError> {
         let n = self.inputs.len();
-        if [reference.len(), measured.len(), command.len(), model.size()] != [n; 4] {
+        let sizes = [reference.len(), measured.len(), command.len(), model.size()];
+        if sizes.iter().any(|size| *size != n) {
             return Err(ControlError::Sizes);
         }
-        if reference.iter().chain(measured).any(|v| !v.is_finite()) {
+        // A sum is finite where all of it is.
+        let signals = reference.iter().zip(measured);
+        let sum = signals.fold(S::zero(), |sum, (r, y)| sum + *r + *y);
+        if !sum.is_finite() {
             return Ok(self.inputs.hold(command));
         }
         let half = self.period * S::of(0.5);

@@ -34,17 +34,19 @@ pub enum Singular {
 /// ```
 pub fn solve<S: Real>(a: &mut [S], b: &mut [S], scale: &mut [S]) -> Result<(), Singular> {
     let n = b.len();
-    if a.len() != n * n
-        || scale.len() != n
-        || a.iter().chain(b.iter()).any(|value| !value.is_finite())
-    {
+    if a.len() != n * n || scale.len() != n {
         return Err(Singular::NotFinite);
     }
+    // An entry that is not finite leaves a solution that is none, or is found where there is none.
+    let because = |a: &[S], b: &[S], why| {
+        let finite = a.iter().chain(b).all(|value| value.is_finite());
+        Err(if finite { why } else { Singular::NotFinite })
+    };
     for i in 0..n {
         let row = &mut a[i * n..(i + 1) * n];
-        let largest = row.iter().fold(S::zero(), |m, v| m.larger(v.abs()));
+        let largest = row[1..].iter().fold(row[0].abs(), |m, v| m.larger(v.abs()));
         if largest == S::zero() {
-            return Err(Singular::Row(i));
+            return because(a, b, Singular::Row(i));
         }
         for value in row {
             *value /= largest;
@@ -52,9 +54,9 @@ pub fn solve<S: Real>(a: &mut [S], b: &mut [S], scale: &mut [S]) -> Result<(), S
         b[i] /= largest;
     }
     for j in 0..n {
-        let largest = (0..n).fold(S::zero(), |m, i| m.larger(a[i * n + j].abs()));
+        let largest = (1..n).fold(a[j].abs(), |m, i| m.larger(a[i * n + j].abs()));
         if largest == S::zero() {
-            return Err(Singular::Column(j));
+            return because(a, b, Singular::Column(j));
         }
         for i in 0..n {
             a[i * n + j] /= largest;
@@ -70,7 +72,7 @@ pub fn solve<S: Real>(a: &mut [S], b: &mut [S], scale: &mut [S]) -> Result<(), S
         }
         let pivot = a[best * n + k];
         if pivot.abs() < S::of(LEAST_PIVOT) {
-            return Err(Singular::Dependent(pivot.abs().value()));
+            return because(a, b, Singular::Dependent(pivot.abs().value()));
         }
         if best != k {
             for j in k..n {
@@ -98,7 +100,8 @@ pub fn solve<S: Real>(a: &mut [S], b: &mut [S], scale: &mut [S]) -> Result<(), S
     for (value, scale) in b.iter_mut().zip(scale.iter()) {
         *value /= *scale;
     }
-    if b.iter().all(|value| value.is_finite()) {
+    // A sum is finite where all of it is.
+    if b.iter().fold(S::zero(), |sum, v| sum + *v).is_finite() {
         Ok(())
     } else {
         Err(Singular::NotFinite)
@@ -145,7 +148,19 @@ mod tests {
         assert_eq!(solve([1.0, 2.0, 0.0, 0.0]), Err(Singular::Row(1)));
         assert_eq!(solve([1.0, 0.0, 3.0, 0.0]), Err(Singular::Column(1)));
         assert_eq!(solve([1.0, 2.0, 2.0, 4.0]), Err(Singular::Dependent(0.0)));
-        assert_eq!(solve([1.0, f64::NAN, 2.0, 4.0]), Err(Singular::NotFinite));
+        for (i, entry) in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY]
+            .into_iter()
+            .enumerate()
+        {
+            for at in 0..6 {
+                for (mut a, mut b) in [([1.0, 2.0, 3.0, 4.0], [1.0, 2.0]), ([0.0; 4], [0.0; 2])] {
+                    let to = if at < 4 { &mut a[at] } else { &mut b[at - 4] };
+                    *to = entry;
+                    let solved = super::solve(&mut a, &mut b, &mut [0.0; 2]);
+                    assert_eq!(solved, Err(Singular::NotFinite), "{i}, {at}");
+                }
+            }
+        }
         assert_eq!(solve([1.0, 0.0, 0.0, 1e-12]), Ok(()));
     }
 }

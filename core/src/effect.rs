@@ -103,8 +103,8 @@ impl<S: Real> Reading<'_, S> {
     }
 }
 
-/// The past of one channel.
-pub trait Past<S> {
+/// The past of one channel. A reading may be kept, and taken to another thread with whoever keeps it.
+pub trait Past<S>: Sync {
     /// Mean of the channel's nominal value between two instants, s since the start of the run.
     ///
     /// Differentiable in both bounds. Before the run began the value is that at its start.

@@ -30,6 +30,7 @@ mod plant;
 mod real;
 mod signal;
 pub mod supervisor;
+mod tanh;
 mod tick;
 pub mod unit;
 

@@ -9,7 +9,8 @@ use num_traits::{One, Zero};
 /// A real number: `f32` on a microcontroller, `f64` on a desk, a dual number in a fit.
 ///
 /// Plants and effects are written once for any `Real`. The elementary functions come from `libm`
-/// for `f32` and `f64` alike, so a loop gives the same digits on every machine.
+/// for `f32` and `f64` alike (`tanh` of an `f32` is this crate's own), so a loop gives the same digits on
+/// every machine.
 ///
 /// Comparisons look at the value only: a dual number compares by its real part, so a branch
 /// (a dead zone, say) takes the derivative of the side it is on.
@@ -86,6 +87,9 @@ impl Real for f32 {
     fn of(value: f64) -> Self {
         value as f32
     }
+    fn abs(self) -> Self {
+        f32::abs(self)
+    }
     fn value(self) -> f64 {
         f64::from(self)
     }
@@ -99,7 +103,7 @@ impl Real for f32 {
         libm::sincosf(self)
     }
     fn tanh(self) -> Self {
-        libm::tanhf(self)
+        crate::tanh::tanhf(self)
     }
     fn exp(self) -> Self {
         libm::expf(self)
@@ -124,6 +128,9 @@ impl Real for f32 {
 impl Real for f64 {
     fn of(value: f64) -> Self {
         value
+    }
+    fn abs(self) -> Self {
+        f64::abs(self)
     }
     fn value(self) -> f64 {
         self

@@ -144,6 +144,8 @@ pub struct Loop<S, D, C, M, O, K, B, W = ()> {
     /// Limits of the inputs, between controller and driver.
     pub input_limits: Option<Limits<B>>,
     period: f64,
+    /// The period as the loop's scalar, s.
+    seconds: S,
     index: u64,
     /// When the first tick began, by the clock.
     origin: f64,
@@ -155,7 +157,6 @@ pub struct Loop<S, D, C, M, O, K, B, W = ()> {
     limited: B,
     applied: B,
     outcome: Command,
-    marker: core::marker::PhantomData<S>,
 }
 
 /// What one tick did; borrowed from the loop's buffers.
@@ -190,6 +191,7 @@ type Advance<S> = (Tick<S>, Sample<S>, Command, Option<Event<S>>);
 
 impl<S, D, C, M, O, K, B> Loop<S, D, C, M, O, K, B>
 where
+    S: Real,
     B: Clone,
 {
     /// Composes a loop. The first `reference.len()` measured signals are the controlled states;
@@ -221,6 +223,7 @@ where
             target_limits: None,
             input_limits: None,
             period,
+            seconds: S::of(period),
             index: 0,
             origin: 0.0,
             reference: controlled.clone(),
@@ -231,7 +234,6 @@ where
             command,
             applied,
             outcome: Command::default(),
-            marker: core::marker::PhantomData,
         }
     }
 
@@ -248,6 +250,7 @@ where
             target_limits: self.target_limits,
             input_limits: self.input_limits,
             period: self.period,
+            seconds: self.seconds,
             index: self.index,
             origin: self.origin,
             reference: self.reference,
@@ -258,7 +261,6 @@ where
             limited: self.limited,
             applied: self.applied,
             outcome: self.outcome,
-            marker: self.marker,
         }
     }
 }
@@ -330,7 +332,7 @@ where
         let tick = Tick {
             index: self.index,
             time: S::of(self.index as f64 * self.period),
-            period: S::of(self.period),
+            period: self.seconds,
         };
         let sample = self
             .driver

@@ -1,10 +1,10 @@
 //! What the effects of a model add to the efforts of its plant.
 
 use heapless::Vec;
-use loopsight_core::{NoPast, Physics, Place, Plant, Reading, Real, Role};
+use loopsight_core::{NoPast, Place, Plant, Reading, Real, Role};
 use loopsight_link::{Attachment, CHANNELS, EFFECTS, PARAMETERS, Unusable};
 
-use crate::effects::effect;
+use crate::Known;
 
 /// Most roles that an effect reads at a channel.
 const ROLES: usize = 4;
@@ -18,17 +18,24 @@ const ROLES: usize = 4;
 /// The same order, and the same source of every effect, as in a simulation on a host.
 #[derive(Clone)]
 pub struct Efforts<S: 'static, const NX: usize> {
-    bounds: Vec<Bound<S>, { EFFECTS * CHANNELS }>,
-    values: Vec<Vec<S, PARAMETERS>, EFFECTS>,
+    effects: Vec<Acting<S>, EFFECTS>,
     /// Which state of the plant is the `i`-th controlled one.
     controlled: &'static [usize],
 }
 
-/// One effect at one of its channels.
+/// One effect, at all its channels.
 #[derive(Clone)]
-struct Bound<S: 'static> {
-    physics: &'static dyn Physics<S>,
-    effect: usize,
+struct Acting<S: 'static> {
+    known: Known,
+    values: Vec<S, PARAMETERS>,
+    channels: Vec<At<S>, CHANNELS>,
+    /// What it sees at the present channel; roles that it does not read are never written.
+    reading: Reading<'static, S>,
+}
+
+/// A channel that an effect is at.
+#[derive(Clone)]
+struct At<S> {
     effort: usize,
     side: S,
     /// Roles and where their signals are: states first, then outputs (inputs are not offered).
@@ -48,8 +55,7 @@ impl<S: Real, const NX: usize> Efforts<S, NX> {
         P: Plant<NX, NU, NW, NP, NY>,
     {
         Self {
-            bounds: Vec::new(),
-            values: Vec::new(),
+            effects: Vec::new(),
             controlled: P::META.controlled,
         }
     }
@@ -64,17 +70,29 @@ impl<S: Real, const NX: usize> Efforts<S, NX> {
         let mut efforts = Self::none::<P, NU, NW, NP, NY>();
         for (index, attachment) in attachments.iter().enumerate() {
             let at = index as u8;
-            let (meta, physics) = effect::<S>(&attachment.id).ok_or(Unusable::Effect(at))?;
+            let known = Known::named(&attachment.id).ok_or(Unusable::Effect(at))?;
+            let meta = known.meta();
             let finite = attachment.values.iter().all(|v| v.is_finite());
             if meta.parameters.len() != attachment.values.len() || !finite {
                 return Err(Unusable::Effect(at));
             }
             let values = attachment.values.iter().map(|v| S::of(f64::from(*v)));
-            let full = |_| Unusable::Effect(at);
-            efforts
-                .values
-                .push(values.collect())
-                .map_err(|_| Unusable::Effect(at))?;
+            let mut acting = Acting {
+                known,
+                values: values.collect(),
+                channels: Vec::new(),
+                reading: Reading {
+                    time: 0.0,
+                    from: 0.0,
+                    to: 0.0,
+                    nominal: S::zero(),
+                    side: S::zero(),
+                    is_position: false,
+                    roles: [S::zero(); Role::COUNT],
+                    signals: &[],
+                    past: &NoPast,
+                },
+            };
             for channel in &attachment.channels {
                 let channel =
                     (P::META.channels.get(usize::from(*channel))).ok_or(Unusable::Channel(at))?;
@@ -89,23 +107,25 @@ impl<S: Real, const NX: usize> Efforts<S, NX> {
                         .push((*role, place))
                         .map_err(|_| Unusable::Reads(at))?;
                 }
-                let bound = Bound {
-                    physics,
-                    effect: index,
+                let side = S::of(f64::from(channel.side));
+                let place = At {
                     effort,
-                    side: S::of(f64::from(channel.side)),
+                    side,
                     reads,
                 };
-                efforts.bounds.push(bound).map_err(|b| full(b.effect))?;
+                let full = |_| Unusable::Effect(at);
+                acting.channels.push(place).map_err(full)?;
             }
+            let full = |_| Unusable::Effect(at);
+            efforts.effects.push(acting).map_err(full)?;
         }
         Ok(efforts)
     }
 
     /// The efforts where the controlled states are `y`.
-    #[inline]
+    #[inline(always)]
     pub fn at<P, const NU: usize, const NW: usize, const NP: usize, const NY: usize>(
-        &self,
+        &mut self,
         y: &[S; NU],
         p: &[S; NP],
     ) -> [S; NW]
@@ -113,38 +133,51 @@ impl<S: Real, const NX: usize> Efforts<S, NX> {
         P: Plant<NX, NU, NW, NP, NY>,
     {
         let mut w = [S::zero(); NW];
-        if self.bounds.is_empty() {
+        if self.effects.is_empty() {
             return w;
         }
         let mut x = [S::zero(); NX];
         for (state, value) in self.controlled.iter().zip(y) {
             x[*state] = *value;
         }
-        let u = [S::zero(); NU];
-        for bound in &self.bounds {
-            let mut roles = [S::zero(); Role::COUNT];
-            for (role, place) in &bound.reads {
-                roles[*role as usize] = match *place {
-                    Where::State(i) => x[i],
-                    Where::Output(i) => P::output(i, &x, &u, p),
-                };
+        for acting in &mut self.effects {
+            let reading = &mut acting.reading;
+            for at in &acting.channels {
+                for (role, place) in &at.reads {
+                    reading.roles[*role as usize] = match *place {
+                        Where::State(i) => x[i],
+                        Where::Output(i) => output::<S, P, NX, NU, NW, NP, NY>(i, &x, p),
+                    };
+                }
+                let effort = &mut w[at.effort];
+                (reading.nominal, reading.side) = (*effort, at.side);
+                *effort += acting.known.contribution(reading, &acting.values);
             }
-            let reading = Reading {
-                time: 0.0,
-                from: 0.0,
-                to: 0.0,
-                nominal: w[bound.effort],
-                side: bound.side,
-                is_position: false,
-                roles,
-                signals: &[],
-                past: &NoPast,
-            };
-            let values = self.values[bound.effect].as_slice();
-            w[bound.effort] += bound.physics.contribution(&reading, &[], values);
         }
         w
     }
+}
+
+/// An output that reads no inputs. Not inlined: a compiler would work out all of them.
+#[inline(never)]
+fn output<
+    S,
+    P,
+    const NX: usize,
+    const NU: usize,
+    const NW: usize,
+    const NP: usize,
+    const NY: usize,
+>(
+    index: usize,
+    x: &[S; NX],
+    p: &[S; NP],
+) -> S
+where
+    S: Real,
+    P: Plant<NX, NU, NW, NP, NY>,
+{
+    P::output(index, x, &[S::zero(); NU], p)
 }
 
 /// The signal `name`, where it follows from the controlled states alone: everything else is not known

@@ -48,7 +48,11 @@ pub struct Learner<
 > {
     rows: [Row<S, R>; NU],
     values: [S; NP],
+    /// What is learned is zero, the rest as it is known.
     base: [S; NP],
+    /// The same with the `k`-th parameter of every row at one: no parameter moves the rate of another row
+    /// than its own, so one of each is tried at a time.
+    probes: [[S; NP]; R],
     efforts: Efforts<S, NX>,
     rate: S,
     means: bool,
@@ -156,8 +160,15 @@ where
             rows.push(row).map_err(|_| Unusable::Plant)?;
         }
         let rows = rows.into_array().map_err(|_| Unusable::Plant)?;
+        let mut probes = [base; R];
+        for (k, probe) in probes.iter_mut().enumerate() {
+            for row in &rows {
+                probe[row.parameters[k]] = S::one();
+            }
+        }
         Ok(Self {
             rows,
+            probes,
             values,
             base,
             efforts,
@@ -188,13 +199,9 @@ where
         let w = self.efforts.at::<P, NU, NW, NP, NY>(&middle, &self.values);
         let rate = |p: &[S; NP]| rates::<S, P, NX, NU, NW, NP, NY>(&middle, u, &w, p);
         let zero = rate(&self.base);
+        let moved: [[S; NU]; R] = core::array::from_fn(|k| rate(&self.probes[k]));
         for (i, row) in self.rows.iter_mut().enumerate() {
-            let mut phi = [S::zero(); R];
-            for (phi, j) in phi.iter_mut().zip(row.parameters) {
-                self.base[j] = S::one();
-                *phi = rate(&self.base)[i] - zero[i];
-                self.base[j] = S::zero();
-            }
+            let phi: [S; R] = core::array::from_fn(|k| moved[k][i] - zero[i]);
             let y = (now[i] - before[i]) * self.rate - zero[i];
             row.lesson = row.estimator.update(&phi, y, why);
             for (j, value) in row.parameters.iter().zip(row.estimator.theta()) {
@@ -286,8 +293,10 @@ where
 
     fn teach(&self, model: &mut dyn AffineModel<S>) {
         if self.certainty_equivalence {
-            for j in self.rows.iter().flat_map(|row| row.parameters) {
-                model.learn(j, self.values[j]);
+            for row in &self.rows {
+                for j in row.parameters {
+                    model.learn(j, self.values[j]);
+                }
             }
         }
     }

@@ -30,7 +30,7 @@ mod robot;
 mod session;
 mod watch;
 
-pub use effects::effect;
+pub use effects::Known;
 pub use efforts::Efforts;
 #[cfg(feature = "std")]
 pub use host::{Aboard, Acknowledged, Line, LineError, SafetySettings, SendError, Serial, send};

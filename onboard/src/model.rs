@@ -77,8 +77,10 @@ where
         for (to, (f, push)) in drift.iter_mut().zip(f.iter().zip(push)) {
             *to = *f + push;
         }
-        for (to, from) in input_matrix.iter_mut().zip(g.as_flattened()) {
-            *to = *from;
+        // By rows, whose length is known when this is compiled.
+        let (rows, _) = input_matrix.as_chunks_mut::<NU>();
+        for (to, from) in rows.iter_mut().zip(g) {
+            *to = from;
         }
     }
 

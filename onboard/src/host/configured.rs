@@ -10,7 +10,7 @@ use loopsight_link::{Attachment, Configuration, ControllerGains, Learning, NAME,
 use nalgebra::DVector;
 
 use super::Aboard;
-use crate::effects::effect;
+use crate::Known;
 
 /// An error at a key of a table within `[controller.aboard]`.
 fn within(table: &str, error: BuildError) -> BuildError {
@@ -158,7 +158,8 @@ fn attachment(
         BuildError::at("", format!("the effect `{id}` of the model {what}"))
             .help("leave it out of the model that the robot is told, or run the law on the host")
     };
-    let (meta, _) = effect::<f32>(id).ok_or_else(|| wrong("is not known aboard"))?;
+    let known = Known::named(id).ok_or_else(|| wrong("is not known aboard"))?;
+    let meta = known.meta();
     let mut channels = Vec::new();
     for channel in &attached.at {
         let at = plant.channels.iter().position(|c| c.id == channel.id);
