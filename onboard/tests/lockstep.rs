@@ -8,7 +8,10 @@
 mod board;
 mod twil;
 
-use board::{Board, INSTRUCTIONS_PER_COUNT};
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+
+use board::{Board, INSTRUCTIONS_PER_COUNT, firmware, machine};
 use loopsight_link::*;
 use twil::*;
 
@@ -111,5 +114,31 @@ fn what_a_tick_costs() {
         let mut twin = Line::default();
         begin(&mut board, &mut twin, configuration);
         told(name, drive(&mut board, &mut twin, 1000).1);
+    }
+}
+
+/// What the parts cost by themselves, without what guards and connects them: the firmware's `parts`.
+#[test]
+#[ignore = "needs qemu-system-arm and the firmware, named by LOOPSIGHT_FIRMWARE"]
+fn what_the_parts_cost() {
+    let parts = firmware("LOOPSIGHT_FIRMWARE").with_file_name("parts");
+    let mut board = machine(&parts, "stdio")
+        .args(["-monitor", "none"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let said = BufReader::new(board.stdout.take().unwrap());
+    let lines = said.lines().map(|line| line.unwrap());
+    let lines: Vec<String> = lines.take_while(|line| line != "end").collect();
+    board.kill().unwrap();
+    board.wait().unwrap();
+    assert_eq!(lines.len(), 3, "{lines:?}");
+    for line in lines {
+        let (name, cost) = line.split_once(": ").unwrap();
+        let (counts, samples) = cost.split_once(" in ").unwrap();
+        let [counts, samples]: [f64; 2] = [counts, samples].map(|n| n.parse().unwrap());
+        let mean = counts / samples * INSTRUCTIONS_PER_COUNT;
+        assert!(mean > 0.0, "{line}");
+        println!("instructions, {name}: {mean:.0}");
     }
 }

@@ -10,7 +10,7 @@
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
@@ -35,6 +35,27 @@ pub(crate) struct Board {
     rest: Vec<u8>,
 }
 
+/// The firmware that this variable names.
+pub(crate) fn firmware(variable: &str) -> PathBuf {
+    std::env::var_os(variable)
+        .unwrap_or_else(|| panic!("{variable} names the firmware, built as its README says"))
+        .into()
+}
+
+/// An emulated board with this program, its line at `serial`.
+pub(crate) fn machine(program: &Path, serial: &str) -> Command {
+    let mut machine = Command::new("qemu-system-arm");
+    machine
+        .args(["-machine", "mps2-an386", "-cpu", "cortex-m4"])
+        .args(["-display", "none"])
+        .args(["-icount", &format!("shift={SHIFT}")])
+        .args(["-serial", serial])
+        .arg("-kernel")
+        .arg(program)
+        .stdin(Stdio::null());
+    machine
+}
+
 impl Board {
     /// Switches a board on and waits for what it says first.
     pub(crate) fn start() -> Self {
@@ -43,22 +64,15 @@ impl Board {
 
     /// The same with the firmware that this variable names.
     pub(crate) fn with(variable: &str) -> Self {
-        let firmware = std::env::var(variable)
-            .unwrap_or_else(|_| panic!("{variable} names the firmware, built as its README says"));
         static BOARDS: AtomicU32 = AtomicU32::new(0);
         let number = BOARDS.fetch_add(1, Ordering::Relaxed);
         let name = format!("loopsight-{}-{number}.line", std::process::id());
         let socket = std::env::temp_dir().join(name);
         let monitor = socket.with_extension("monitor");
-        let machine = Command::new("qemu-system-arm")
-            .args(["-machine", "mps2-an386", "-cpu", "cortex-m4"])
-            .args(["-display", "none", "-monitor"])
+        let line = format!("unix:{},server=on,wait=on", socket.display());
+        let machine = machine(&firmware(variable), &line)
+            .arg("-monitor")
             .arg(format!("unix:{},server=on,wait=off", monitor.display()))
-            .args(["-icount", &format!("shift={SHIFT}")])
-            .arg("-serial")
-            .arg(format!("unix:{},server=on,wait=on", socket.display()))
-            .args(["-kernel", &firmware])
-            .stdin(Stdio::null())
             .spawn()
             .expect("qemu-system-arm starts");
         // It makes the socket, and waits for who opens it.
