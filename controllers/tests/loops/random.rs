@@ -56,6 +56,16 @@ delay = {delay}
         ))
     }
 
+    /// Decay of a speed under `feedback_linearizing_pi` of [`GAIN`] with what is `believed`, the
+    /// smaller one, 1/s: `g/ĝ (k_p + â) - a` for a robot `y' = a y + g u`, believed `â`, `ĝ`. A decay
+    /// that is believed too fast, and a gain too small, are made up for twice: negative is unstable.
+    fn linearised(self, believed: Self) -> f64 {
+        [0, 2]
+            .map(|i| self.k[i + 1] / believed.k[i + 1] * (GAIN + believed.k[i]) - self.k[i])
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    }
+
     /// Speeds that half of 9 V on both motors, or against each other, hold against the friction.
     fn reach(self) -> [f64; 2] {
         let [k_a, k_c, k_d, k_f] = self.k;
@@ -67,6 +77,9 @@ delay = {delay}
 fn by(most: f64) -> impl Strategy<Value = [f64; 6]> {
     proptest::array::uniform6(-most..most)
 }
+
+/// Proportional gain of a settling time of 1 s, 1/s.
+const GAIN: f64 = 8.0;
 
 /// One of the laws, at a design that suits all of these robots.
 fn laws() -> impl Strategy<Value = &'static str> {
@@ -128,11 +141,13 @@ proptest! {
         }
     }
 
-    /// Up to 25 % wrong: what was out of reach is forgotten, and both speeds come to their references.
+    /// Up to 25 % wrong: what was out of reach is forgotten, and both speeds come to their references,
+    /// where the law is stable at all with what is believed.
     #[test]
     fn references_are_reached(
         robot in robots(), off in by(0.25), law in laws(), seed in 0u64..1000,
     ) {
+        prop_assume!(!law.starts_with("feedback") || robot.linearised(robot.off(off)) > 0.3 * GAIN);
         let reach = robot.reach();
         let trace = run(&loop_file(law, reach, seed, 0.0), &robot.off(off).model(), &robot.model(), 1500);
         for (i, reach) in reach.iter().enumerate() {
