@@ -1,6 +1,6 @@
 //! Everything the library could add to a model, and where.
 
-use loopsight_core::model::{Model, misfit};
+use loopsight_core::model::{Attached, Model, misfit};
 use loopsight_core::registry;
 use loopsight_core::sensor::Sensor;
 use loopsight_core::{Channel, EffectMeta, Parameter, Place, Role};
@@ -19,6 +19,8 @@ pub(crate) struct Candidate {
     pub(crate) model: Model,
     /// Root mean square of the flow at its channels in the recording; 0 where there is none.
     pub(crate) flow: f64,
+    /// Widths over which signs of all effects are smoothed at first, by index of the parameter.
+    pub(crate) widths: Vec<(usize, f64)>,
 }
 
 impl Candidate {
@@ -54,6 +56,12 @@ impl Candidate {
             .count()
     }
 
+    /// Its own parameters on which the effect does not depend linearly.
+    pub(crate) fn shape(&self) -> Vec<usize> {
+        let nonlinear = |i: &usize| !self.model.parameters[*i].declaration.linear;
+        self.own().filter(nonlinear).collect()
+    }
+
     /// The candidate with its sign smoothed over this share of the flow; none where it has no sign.
     pub(crate) fn smoothed(&self, share: f64) -> Option<Self> {
         let mut sharp = self.clone();
@@ -74,6 +82,17 @@ impl Candidate {
         };
         let width = speeds(true).fold(0.0, f64::max);
         speeds(false).any(|speed| speed < CLEAR * width)
+    }
+
+    /// Its model with every sign, also of the effects that were there before, smoothed so widely that
+    /// a fit finds its way: what sticks sharply answers to nothing, and then to everything.
+    pub(crate) fn softened(&self) -> Model {
+        let mut model = self.model.clone();
+        for (index, width) in &self.widths {
+            let value = &mut model.parameters[*index].value;
+            *value = value.map(|present| present.max(*width));
+        }
+        model
     }
 
     /// The candidate with the values of `start` for those of its parameters that are not estimated.
@@ -141,6 +160,7 @@ pub(crate) fn candidates(model: &Model, rms: &[f64]) -> Vec<Candidate> {
                         at: at.clone(),
                         separate: *separate,
                         replaces: replaces.clone(),
+                        widths: widths(&model, rms),
                         model,
                         flow,
                     });
@@ -160,17 +180,32 @@ const CLEAR: f64 = 3.0;
 /// Gives the last effect of `model` the widths that suit the recording; returns the root mean
 /// square of the flow at its channels.
 pub(crate) fn suit(model: &mut Model, rms: &[f64]) -> f64 {
-    let Some(effect) = model.effects.last() else {
-        return 0.0;
-    };
-    let flow = effect
-        .at
-        .iter()
-        .filter_map(|c| model.find_signal(c.read(Role::Flow)?).ok())
-        .filter_map(|i| rms.get(i).copied())
-        .fold(0.0, f64::max);
+    let flow = model.effects.last().map_or(0.0, |e| flow(model, e, rms));
     smooth(model, 1, WIDTH * flow);
     flow
+}
+
+/// Root mean square of the flow at an effect's channels; 0 where there is none.
+fn flow(model: &Model, effect: &Attached, rms: &[f64]) -> f64 {
+    let channels = effect.at.iter();
+    channels
+        .filter_map(|c| model.find_signal(c.read(Role::Flow)?).ok())
+        .filter_map(|i| rms.get(i).copied())
+        .fold(0.0, f64::max)
+}
+
+/// The widths that suit the recording, of all effects that have one, by index of the parameter.
+fn widths(model: &Model, rms: &[f64]) -> Vec<(usize, f64)> {
+    let of_effect = |effect: &Attached| {
+        let width = WIDTH * flow(model, effect, rms);
+        let declarations = effect.meta.parameters.iter().enumerate();
+        let first = effect.first_parameter;
+        declarations
+            .filter(|(_, declaration)| is_width(declaration))
+            .map(|(i, _)| (first + i, width))
+            .collect::<Vec<_>>()
+    };
+    model.effects.iter().flat_map(of_effect).collect()
 }
 
 /// Whether a parameter is a speed over which a sign is smoothed.

@@ -1,6 +1,6 @@
 //! Diagnose, add, refit, until nothing more is missing.
 
-use loopsight_core::model::Model;
+use loopsight_core::model::{Attached, Model};
 use loopsight_core::run::Run;
 use loopsight_recordings::Fault;
 use serde::Serialize;
@@ -13,7 +13,7 @@ use crate::fit::{Fit, FitError, FitSettings, fit};
 /// One step of an improvement.
 #[derive(Clone, Debug, Serialize)]
 pub struct Step {
-    /// What was added; `null` for the model as it was.
+    /// What was added, under the name that it has in the best model; `null` for the model as it was.
     pub added: Option<Place>,
     /// Free-run error on what the model was fitted to.
     pub nrmse_fit: f64,
@@ -86,7 +86,7 @@ pub fn improve(
             nrmse_test: best.nrmse,
         });
         present = sharpened(
-            simplified(best.model, runs, test, faults)?,
+            simplified(best.model, &mut steps, runs, test, faults)?,
             runs,
             test,
             faults,
@@ -111,10 +111,12 @@ pub fn improve(
     })
 }
 
-/// A simpler effect replaces one that contains it when the error hardly grows: what looked like
-/// breakaway friction may have been friction with a delay that was still missing.
+/// A simpler effect takes the place of an added one that contains it where the error hardly grows:
+/// what looked like breakaway friction may have been friction with a delay that was still missing.
+/// The step that added it is then one that added the simpler effect.
 fn simplified(
     model: Model,
+    steps: &mut [Step],
     runs: &[Run],
     test: Option<&[Run]>,
     faults: &[Fault],
@@ -122,9 +124,16 @@ fn simplified(
     let error = |m: &Model| refitted(m, runs, test, faults);
     let mut best = model;
     let mut least = None;
-    for index in 0..best.effects.len() {
-        for id in best.effects[index].meta.simpler {
-            let Some(candidate) = best.with_effect_replaced(index, id) else {
+    for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
+        let instances = instances(&best, place);
+        let Some(meta) = instances.first().map(|index| best.effects[*index].meta) else {
+            continue;
+        };
+        for id in meta.simpler {
+            let candidate = instances.iter().try_fold(best.clone(), |model, index| {
+                model.with_effect_replaced(*index, id)
+            });
+            let Some(candidate) = candidate else {
                 continue;
             };
             let now = match least {
@@ -136,11 +145,23 @@ fn simplified(
             if after < SIMPLER * now {
                 best = fitted;
                 least = Some(after);
+                (*id).clone_into(&mut place.effect);
                 break;
             }
         }
     }
     Ok(best)
+}
+
+/// Where the effect of a step stands among those of `model`: once, or once for each of its channels;
+/// nowhere when another has taken its place.
+fn instances(model: &Model, place: &Place) -> Vec<usize> {
+    let of_place = |e: &Attached| {
+        e.meta.id == place.effect && e.at.iter().all(|c| place.at.iter().any(|at| at == c.id))
+    };
+    (0..model.effects.len())
+        .filter(|index| of_place(&model.effects[*index]))
+        .collect()
 }
 
 /// How much the error may grow for a simpler explanation.

@@ -253,6 +253,29 @@ impl<'a> Problem<'a> {
         cost.is_finite().then_some(cost.max(0.0))
     }
 
+    /// The values that a full Gauss–Newton step from `values` leads to, those at `fixed` as they are.
+    pub(crate) fn stride(
+        &self,
+        values: &[f64],
+        states: &[DVector<f64>],
+        fixed: &[usize],
+    ) -> Option<Vec<f64>> {
+        let start = self.pack(values, states);
+        let (residual, mut jacobian) = self.linearise(&start);
+        for (column, index) in self.free.iter().enumerate() {
+            if fixed.contains(index) {
+                jacobian.column_mut(column).fill(0.0);
+            }
+        }
+        let step = pseudo_inverse(&jacobian.tr_mul(&jacobian))? * jacobian.tr_mul(&residual);
+        let (mut values, _) = self.unpack(&(start - step));
+        for index in &self.free {
+            let declaration = self.model.parameters[*index].declaration;
+            values[*index] = declaration.nearest(values[*index]);
+        }
+        values.iter().all(|v| v.is_finite()).then_some(values)
+    }
+
     /// What scaled unknowns stand for.
     pub(crate) fn solution(&self, scaled: &DVector<f64>) -> Solution {
         let (values, states) = self.unpack(scaled);

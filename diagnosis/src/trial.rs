@@ -151,7 +151,10 @@ fn starts(
                 .map(|s| nearest(s * candidate.flow))
                 .collect()
         } else if listed.is_empty() {
-            vec![nearest(neutral + parameter.scale())]
+            // Where the position is measured, what is linear in the effect is regressed.
+            let regressed = parameter.declaration.linear && Positions::matter_to(candidate.meta);
+            let step = if regressed { 0.0 } else { parameter.scale() };
+            vec![nearest(neutral + step)]
         } else {
             listed.into_iter().map(nearest).collect()
         };
@@ -169,10 +172,10 @@ fn starts(
     all
 }
 
-/// The model of a candidate with coarser steps. A file that asks for finer steps than usual has lags
+/// The model of a candidate with softened signs and coarser steps. A file that asks for finer steps than usual has lags
 /// that no longer ones stand.
 fn coarse(candidate: &Candidate, steps: f64) -> Model {
-    let mut model = candidate.model.clone();
+    let mut model = candidate.softened();
     let usual = model.usual_step();
     if model.max_step >= usual {
         model.max_step = model.max_step.max(steps * usual);
@@ -221,6 +224,10 @@ pub(crate) fn look(
     if let Some(measured) = positions(candidate, &start) {
         let mut problem = problem().ok()?;
         problem.positions = Some(measured);
+        // What is linear in the effect begins where a regression has it: a ripple against the true
+        // one makes a machine stick that does not.
+        let shape = candidate.shape();
+        start = problem.stride(&start, &states, &shape).unwrap_or(start);
         start = problem.solve_from(&start, &states, LOOK).ok()?.values;
     }
     let solution = problem().ok()?.solve_from(&start, &states, LOOK).ok()?;

@@ -139,7 +139,11 @@ fn pairs() {
             };
             let classes = added(&found);
             let has = |id: &str| classes.iter().any(|c| c.iter().any(|e| e == id));
-            let both = has(a.id()) && has(b.id());
+            let last = |id: &str| {
+                let places = found.steps.iter().filter_map(|s| s.added.as_ref());
+                places.into_iter().any(|p| p.effect == id)
+            };
+            let both = [a.id(), b.id()].iter().all(|id| has(id) || last(id));
             println!(
                 "  {} {} + {}: {}; unseen {:.2} %, floor {:.2} %",
                 if both { "both  " } else { "MISSED" },
