@@ -5,6 +5,8 @@ use loopsight_core::registry;
 use loopsight_core::sensor::Sensor;
 use loopsight_core::{Channel, EffectMeta, Parameter, Place, Role};
 
+use crate::positions::Positions;
+
 /// An effect at a set of channels.
 #[derive(Clone, Debug)]
 pub(crate) struct Candidate {
@@ -56,10 +58,12 @@ impl Candidate {
             .count()
     }
 
-    /// Its own parameters on which the effect does not depend linearly.
-    pub(crate) fn shape(&self) -> Vec<usize> {
-        let nonlinear = |i: &usize| !self.model.parameters[*i].declaration.linear;
-        self.own().filter(nonlinear).collect()
+    /// Its own parameters on which the effect does not depend linearly, where it reads a position and
+    /// depends on others linearly: with the positions as measured, those are a regression's.
+    pub(crate) fn shape(&self) -> Option<Vec<usize>> {
+        let linear = |i: &usize| self.model.parameters[*i].declaration.linear;
+        let regressed = Positions::matter_to(self.meta) && self.own().any(|i| linear(&i));
+        regressed.then(|| self.own().filter(|i| !linear(i)).collect())
     }
 
     /// The candidate with its sign smoothed over this share of the flow; none where it has no sign.

@@ -136,6 +136,7 @@ fn starts(
     duration: f64,
 ) -> Vec<Vec<f64>> {
     let mut all = vec![base.to_vec()];
+    let regressed = candidate.shape().is_some();
     for i in candidate.own() {
         let parameter = &candidate.model.parameters[i];
         let nearest = |value: f64| parameter.declaration.nearest(value);
@@ -152,8 +153,12 @@ fn starts(
                 .collect()
         } else if listed.is_empty() {
             // Where the position is measured, what is linear in the effect is regressed.
-            let regressed = parameter.declaration.linear && Positions::matter_to(candidate.meta);
-            let step = if regressed { 0.0 } else { parameter.scale() };
+            let neutral_first = regressed && parameter.declaration.linear;
+            let step = if neutral_first {
+                0.0
+            } else {
+                parameter.scale()
+            };
             vec![nearest(neutral + step)]
         } else {
             listed.into_iter().map(nearest).collect()
@@ -195,7 +200,12 @@ pub(crate) fn promise(
     } else {
         PROMISE_STEPS
     };
-    let model = coarse(candidate, steps);
+    let mut model = coarse(candidate, steps);
+    // While what is linear in it is neutral, its shape says nothing: a pass of derivatives less.
+    for index in candidate.shape().unwrap_or_default() {
+        model.parameters[index].free = false;
+        model.parameters[index].value = Some(start[index]);
+    }
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
     let mut problem =
         Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {}).ok()?;
@@ -226,8 +236,9 @@ pub(crate) fn look(
         problem.positions = Some(measured);
         // What is linear in the effect begins where a regression has it: a ripple against the true
         // one makes a machine stick that does not.
-        let shape = candidate.shape();
-        start = problem.stride(&start, &states, &shape).unwrap_or(start);
+        if let Some(shape) = candidate.shape() {
+            start = problem.stride(&start, &states, &shape).unwrap_or(start);
+        }
         start = problem.solve_from(&start, &states, LOOK).ok()?.values;
     }
     let solution = problem().ok()?.solve_from(&start, &states, LOOK).ok()?;

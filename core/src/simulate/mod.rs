@@ -4,6 +4,7 @@ pub(crate) mod bound;
 mod follow;
 pub(crate) mod history;
 mod observer;
+mod past;
 mod push;
 mod ramp;
 mod sensing;
@@ -57,6 +58,9 @@ pub struct Simulator<'m, S> {
     /// Inputs that run on straight lines between samples.
     ramped: Vec<usize>,
 }
+
+/// A time before a run: what is known of it holds for all times before, s.
+const BEFORE: f64 = -1.0;
 
 #[derive(Clone)]
 struct Scratch<S> {
@@ -147,7 +151,8 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         simulator
     }
 
-    /// Starts a run at time 0 from the plant state `x0`, as if `input` had been applied for ever.
+    /// Starts a run at time 0 from the plant state `x0`. Before it `input` was applied, or nothing:
+    /// whichever the machine is closer to rest with.
     pub fn reset(&mut self, x0: &[S], input: &[f64]) {
         let nx = self.model.n_states();
         self.time = 0.0;
@@ -159,9 +164,11 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         for (to, from) in self.scratch.held.iter_mut().zip(input) {
             *to = S::of(*from);
         }
+        let past = past::before(&self.model, &self.p, x0, input);
         for bound in &self.bounds.input_memory {
             if let (Some(history), Place::Input(i)) = (bound.history, bound.place) {
                 self.histories[history].clear();
+                self.histories[history].hold(BEFORE, S::of(past[i]));
                 self.histories[history].hold(0.0, S::of(input[i]));
             }
         }
@@ -171,7 +178,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             let scene = self.scene();
             for bound in self.bounds.all().filter(|b| b.n_z > 0) {
                 let nominal = match bound.place {
-                    Place::Input(i) => self.scratch.held[i],
+                    Place::Input(i) => S::of(past[i]),
                     Place::Output(i) => self.scratch.signals[i],
                     Place::Effort(_) | Place::Rate(_) => S::zero(),
                 };

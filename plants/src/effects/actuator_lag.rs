@@ -21,7 +21,8 @@ use super::first_order;
 /// nothing.
 ///
 /// Assumptions: linear, the same at every level: the inductance of a winding (`L/R`), a low-pass
-/// filter in the motor driver, a hydraulic valve; at the start of a run it has settled.
+/// filter in the motor driver, a hydraulic valve; at the start of a run it has settled
+/// to what was applied before (see `Simulator::reset`).
 ///
 /// Reference: G. F. Franklin, J. D. Powell, A. Emami-Naeini (2002), "Feedback Control of Dynamic
 /// Systems", 4th edition, Prentice Hall, chapter 2, the DC motor with the inductance of its
