@@ -179,13 +179,12 @@ pub fn unit_at(unit: &str, channel: &Channel, plant: &'static PlantMeta) -> (Str
 }
 
 impl Model {
-    /// The model with its `index`-th effect replaced by the effect `id` at the same channels;
+    /// The model with its `index`-th effect replaced by the effect `id` at the channels `at`;
     /// parameters of the same name keep their values.
-    pub fn with_effect_replaced(&self, index: usize, id: &str) -> Option<Model> {
-        self.with_effect_changed(index, |model, effect, old| {
+    pub fn with_effect_replaced(&self, index: usize, id: &str, at: &[&str]) -> Option<Model> {
+        self.with_effect_changed(index, |model, old| {
             let first = model.parameters.len();
-            let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
-            let mut model = model.with_effect(id, &at)?;
+            let mut model = model.with_effect(id, at)?;
             for new in &mut model.parameters[first..] {
                 if let Some(from) = old.iter().find(|p| p.declaration.id == new.declaration.id) {
                     new.value = from.value;
@@ -198,15 +197,15 @@ impl Model {
 
     /// The model without its `index`-th effect.
     pub fn without_effect(&self, index: usize) -> Option<Model> {
-        self.with_effect_changed(index, |model, _, _| Some(model))
+        self.with_effect_changed(index, |model, _| Some(model))
     }
 
     /// The model with what `change` makes, in the place of its `index`-th effect, of the model up to
-    /// there, the effect, and the effect's parameters.
+    /// there and the effect's parameters.
     fn with_effect_changed(
         &self,
         index: usize,
-        change: impl Fn(Model, &Attached, &[ModelParameter]) -> Option<Model>,
+        change: impl Fn(Model, &[ModelParameter]) -> Option<Model>,
     ) -> Option<Model> {
         self.effects.get(index)?;
         let mut model = self.clone();
@@ -216,7 +215,7 @@ impl Model {
             let first = effect.first_parameter;
             let own = &self.parameters[first..first + effect.meta.parameters.len()];
             if k == index {
-                model = change(model, effect, own)?;
+                model = change(model, own)?;
             } else {
                 model.keep(effect, own);
             }

@@ -7,7 +7,7 @@ use basin::{
     BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet, Constraints,
     Executor, Jacobian, Residual,
 };
-use loopsight_core::model::{Model, pseudo_inverse};
+use loopsight_core::model::Model;
 use loopsight_core::run::Run;
 use nalgebra::{DMatrix, DVector};
 
@@ -240,40 +240,6 @@ impl<'a> Problem<'a> {
         effort: Effort,
     ) -> Result<Solution, FitError> {
         Ok(self.solution(&self.solve(start, effort)?))
-    }
-
-    /// Cost that one full Gauss–Newton step from `values` would reach if the model were linear in
-    /// its unknowns.
-    pub(crate) fn promise(&self, values: &[f64], states: &[DVector<f64>]) -> Option<f64> {
-        let (residual, jacobian) = self.linearise(&self.pack(values, states));
-        let gram = jacobian.tr_mul(&jacobian);
-        let right = jacobian.tr_mul(&residual);
-        let step = pseudo_inverse(&gram)? * &right;
-        let cost = residual.norm_squared() - right.dot(&step);
-        cost.is_finite().then_some(cost.max(0.0))
-    }
-
-    /// The values that a full Gauss–Newton step from `values` leads to, those at `fixed` as they are.
-    pub(crate) fn stride(
-        &self,
-        values: &[f64],
-        states: &[DVector<f64>],
-        fixed: &[usize],
-    ) -> Option<Vec<f64>> {
-        let start = self.pack(values, states);
-        let (residual, mut jacobian) = self.linearise(&start);
-        for (column, index) in self.free.iter().enumerate() {
-            if fixed.contains(index) {
-                jacobian.column_mut(column).fill(0.0);
-            }
-        }
-        let step = pseudo_inverse(&jacobian.tr_mul(&jacobian))? * jacobian.tr_mul(&residual);
-        let (mut values, _) = self.unpack(&(start - step));
-        for index in &self.free {
-            let declaration = self.model.parameters[*index].declaration;
-            values[*index] = declaration.nearest(values[*index]);
-        }
-        values.iter().all(|v| v.is_finite()).then_some(values)
     }
 
     /// What scaled unknowns stand for.

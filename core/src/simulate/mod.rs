@@ -4,10 +4,10 @@ pub(crate) mod bound;
 mod follow;
 pub(crate) mod history;
 mod observer;
-mod past;
 mod push;
 mod ramp;
 mod sensing;
+mod start;
 mod values;
 
 use std::borrow::Cow;
@@ -58,9 +58,6 @@ pub struct Simulator<'m, S> {
     /// Inputs that run on straight lines between samples.
     ramped: Vec<usize>,
 }
-
-/// A time before a run: what is known of it holds for all times before, s.
-const BEFORE: f64 = -1.0;
 
 #[derive(Clone)]
 struct Scratch<S> {
@@ -149,50 +146,6 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         };
         simulator.reset(&vec![S::zero(); nx], &vec![0.0; nu]);
         simulator
-    }
-
-    /// Starts a run at time 0 from the plant state `x0`. Before it `input` was applied, or nothing:
-    /// whichever the machine is closer to rest with.
-    pub fn reset(&mut self, x0: &[S], input: &[f64]) {
-        let nx = self.model.n_states();
-        self.time = 0.0;
-        self.interval = 0.0;
-        for (to, from) in self.x.iter_mut().zip(x0) {
-            *to = *from;
-        }
-        self.x[nx..].fill(S::zero());
-        for (to, from) in self.scratch.held.iter_mut().zip(input) {
-            *to = S::of(*from);
-        }
-        let past = past::before(&self.model, &self.p, x0, input);
-        for bound in &self.bounds.input_memory {
-            if let (Some(history), Place::Input(i)) = (bound.history, bound.place) {
-                self.histories[history].clear();
-                self.histories[history].hold(BEFORE, S::of(past[i]));
-                self.histories[history].hold(0.0, S::of(input[i]));
-            }
-        }
-        self.refresh();
-        if self.bounds.states > 0 {
-            let mut z = vec![S::zero(); self.bounds.states];
-            let scene = self.scene();
-            for bound in self.bounds.all().filter(|b| b.n_z > 0) {
-                let nominal = match bound.place {
-                    Place::Input(i) => S::of(past[i]),
-                    Place::Output(i) => self.scratch.signals[i],
-                    Place::Effort(_) | Place::Rate(_) => S::zero(),
-                };
-                scene.initial(bound, nominal, &NoPast, &mut z[bound.z - nx..][..bound.n_z]);
-            }
-            self.x[nx..nx + z.len()].copy_from_slice(&z);
-        }
-        for bound in &self.bounds.output_memory {
-            if let Some(history) = bound.history {
-                self.histories[history].clear();
-            }
-        }
-        self.remember();
-        self.mark();
     }
 
     /// Time since the start of the run, s.

@@ -392,7 +392,9 @@ fn two_expressions_have_names_of_their_own() {
     assert_eq!(names, ["K_A", "K_C", "drag.c", "stick.c"]);
     // An effect of the library beside them is replaced, and they stay.
     let with = both.with_effect("coulomb_friction", &["shaft"]).unwrap();
-    let replaced = with.with_effect_replaced(2, "stribeck_friction").unwrap();
+    let replaced = with
+        .with_effect_replaced(2, "stribeck_friction", &["shaft"])
+        .unwrap();
     let ids: Vec<&str> = replaced.effects.iter().map(|e| e.meta.id).collect();
     assert_eq!(ids, ["drag", "stick", "stribeck_friction"]);
     assert_eq!(replaced.parameters[2], both.parameters[2]);

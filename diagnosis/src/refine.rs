@@ -1,0 +1,213 @@
+//! What is put right in a model once another effect was added to it.
+
+use loopsight_core::model::{Attached, Model};
+use loopsight_core::run::Run;
+use loopsight_recordings::Fault;
+
+use crate::candidates::{is_width, smooth};
+use crate::conclusion::Place;
+use crate::fit::{FitError, FitSettings, fit};
+use crate::improve::Step;
+
+/// The model to go on from after the last of `steps`, fitted: simpler effects and others that the data
+/// could not tell from those of the steps (their `classes`) take their places where they may, and the
+/// steps then name them.
+pub(crate) fn refine(
+    model: Model,
+    steps: &mut [Step],
+    classes: &[Vec<Place>],
+    runs: &[Run],
+    test: Option<&[Run]>,
+    faults: &[Fault],
+) -> Result<Model, FitError> {
+    let model = simplified(model, steps, runs, test, faults)?;
+    let model = reconsidered(model, steps, classes, runs, test, faults)?;
+    sharpened(model, runs, test, faults)
+}
+
+/// A simpler effect takes the place of an added one that contains it where the error hardly grows:
+/// what looked like breakaway friction may have been friction with a delay that was still missing.
+/// The step that added it is then one that added the simpler effect.
+fn simplified(
+    model: Model,
+    steps: &mut [Step],
+    runs: &[Run],
+    test: Option<&[Run]>,
+    faults: &[Fault],
+) -> Result<Model, FitError> {
+    let mut best = Refined::new(model, runs, test, faults);
+    for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
+        let instances = instances(&best.model, place);
+        let Some(effect) = instances.first().map(|i| &best.model.effects[*i]) else {
+            continue;
+        };
+        for id in effect.meta.simpler {
+            let candidate = instances.iter().try_fold(best.model.clone(), |model, i| {
+                let at: Vec<&str> = model.effects[*i].at.iter().map(|c| c.id).collect();
+                model.with_effect_replaced(*i, id, &at)
+            });
+            if best.takes(candidate, SIMPLER)? {
+                (*id).clone_into(&mut place.effect);
+                break;
+            }
+        }
+    }
+    Ok(best.model)
+}
+
+/// What the data could not tell from an effect when it was added may be told from it once another
+/// one is there: a late command from a late sensor, when the machine has friction.
+fn reconsidered(
+    model: Model,
+    steps: &mut [Step],
+    classes: &[Vec<Place>],
+    runs: &[Run],
+    test: Option<&[Run]>,
+    faults: &[Fault],
+) -> Result<Model, FitError> {
+    let mut best = Refined::new(model, runs, test, faults);
+    for (step, class) in steps.iter_mut().zip(classes) {
+        let Some(place) = step.added.as_mut() else {
+            continue;
+        };
+        for other in class {
+            let candidate = exchanged(&best.model, place, other);
+            if best.takes(candidate, BETTER)? {
+                *place = other.clone();
+                break;
+            }
+        }
+    }
+    Ok(best.model)
+}
+
+/// The model with the effect of `other` in the place of that of `place`; parameters of the same name
+/// keep their values, others begin a noticeable step from neutral.
+fn exchanged(model: &Model, place: &Place, other: &Place) -> Option<Model> {
+    let instances = instances(model, place);
+    let (first, others) = instances.split_first()?;
+    let known: Vec<&str> = model.effects[*first]
+        .meta
+        .parameters
+        .iter()
+        .map(|p| p.id)
+        .collect();
+    let mut candidate = model.clone();
+    for index in others.iter().rev() {
+        candidate = candidate.without_effect(*index)?;
+    }
+    let at: Vec<&str> = other.at.iter().map(String::as_str).collect();
+    candidate = candidate.with_effect_replaced(*first, &other.effect, &at)?;
+    let effect = &candidate.effects[*first];
+    let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+    for parameter in &mut candidate.parameters[own] {
+        if parameter.free && !known.contains(&parameter.declaration.id) {
+            let start = parameter.value.unwrap_or(0.0) + parameter.scale();
+            parameter.value = Some(parameter.declaration.nearest(start));
+        }
+    }
+    Some(candidate)
+}
+
+/// A model, and others that may take its place.
+struct Refined<'a> {
+    model: Model,
+    /// Its error, once it was needed.
+    error: Option<f64>,
+    runs: &'a [Run],
+    test: Option<&'a [Run]>,
+    faults: &'a [Fault],
+}
+
+impl<'a> Refined<'a> {
+    fn new(model: Model, runs: &'a [Run], test: Option<&'a [Run]>, faults: &'a [Fault]) -> Self {
+        Self {
+            model,
+            error: None,
+            runs,
+            test,
+            faults,
+        }
+    }
+
+    /// Whether `candidate`, fitted, takes the place: where its error is below `share` of the present one.
+    fn takes(&mut self, candidate: Option<Model>, share: f64) -> Result<bool, FitError> {
+        let Some(candidate) = candidate else {
+            return Ok(false);
+        };
+        let now = match self.error {
+            Some(now) => now,
+            None => refitted(&self.model, self.runs, self.test, self.faults)?.0,
+        };
+        self.error = Some(now);
+        let (after, fitted) = refitted(&candidate, self.runs, self.test, self.faults)?;
+        if after.is_nan() || after > share * now {
+            return Ok(false);
+        }
+        (self.model, self.error) = (fitted, Some(after));
+        Ok(true)
+    }
+}
+
+/// Where the effect of a step stands among those of `model`: once, or once for each of its channels;
+/// nowhere when another has taken its place.
+fn instances(model: &Model, place: &Place) -> Vec<usize> {
+    let of_place = |e: &Attached| {
+        e.meta.id == place.effect && e.at.iter().all(|c| place.at.iter().any(|at| at == c.id))
+    };
+    (0..model.effects.len())
+        .filter(|index| of_place(&model.effects[*index]))
+        .collect()
+}
+
+/// How much the error may grow for a simpler explanation, and how much it must fall for another one.
+const SIMPLER: f64 = 1.02;
+const BETTER: f64 = 0.98;
+
+/// The error of a model after a short fit, and the fitted model.
+fn refitted(
+    model: &Model,
+    runs: &[Run],
+    test: Option<&[Run]>,
+    faults: &[Fault],
+) -> Result<(f64, Model), FitError> {
+    let settings = FitSettings {
+        max_iterations: 20,
+        ..FitSettings::default()
+    };
+    let fitted = fit(model, runs, test, faults, &settings, &|_, _| {})?;
+    Ok((fitted.comparison.nrmse, fitted.model))
+}
+
+/// How much the error must fall for a sign to be smoothed over half as much.
+const SHARPER: f64 = 0.99;
+/// Most halvings.
+const HALVINGS: usize = 3;
+
+/// The sign of the effect added last is smoothed over less and less while the error falls by it.
+fn sharpened(
+    model: Model,
+    runs: &[Run],
+    test: Option<&[Run]>,
+    faults: &[Fault],
+) -> Result<Model, FitError> {
+    let mut best = Refined::new(model, runs, test, faults);
+    for _ in 0..HALVINGS {
+        let mut candidate = best.model.clone();
+        let Some(effect) = candidate.effects.last() else {
+            break;
+        };
+        let (meta, first) = (effect.meta, effect.first_parameter);
+        let added = candidate.effects.iter().rev();
+        let count = added.take_while(|e| e.meta.id == meta.id).count();
+        let width = (0..meta.parameters.len())
+            .find(|i| is_width(&meta.parameters[*i]))
+            .and_then(|i| candidate.parameters[first + i].value);
+        let Some(width) = width else { break };
+        smooth(&mut candidate, count, 0.5 * width);
+        if !best.takes(Some(candidate), SHARPER)? {
+            break;
+        }
+    }
+    Ok(best.model)
+}
