@@ -177,10 +177,14 @@ fn starts(
     all
 }
 
-/// The model of a candidate with softened signs and coarser steps. A file that asks for finer steps than usual has lags
+/// The model of a candidate with coarser steps, and with softened signs where it begins with a
+/// regression. A file that asks for finer steps than usual has lags
 /// that no longer ones stand.
 fn coarse(candidate: &Candidate, steps: f64) -> Model {
-    let mut model = candidate.softened();
+    let mut model = match candidate.shape() {
+        Some(_) => candidate.softened(),
+        None => candidate.model.clone(),
+    };
     let usual = model.usual_step();
     if model.max_step >= usual {
         model.max_step = model.max_step.max(steps * usual);
