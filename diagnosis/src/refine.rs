@@ -160,9 +160,10 @@ fn instances(model: &Model, place: &Place) -> Vec<usize> {
         .collect()
 }
 
-/// How much the error may grow for a simpler explanation, and how much it must fall for another one.
+/// How much the error may grow for a simpler explanation.
 const SIMPLER: f64 = 1.02;
-const BETTER: f64 = 0.98;
+/// How much it must fall for another one: less may be what else is missing.
+const BETTER: f64 = 0.9;
 
 /// The error of a model after a short fit, and the fitted model.
 fn refitted(
