@@ -20,22 +20,17 @@ pub(crate) fn refine(
     test: Option<&[Run]>,
     faults: &[Fault],
 ) -> Result<Model, FitError> {
-    let model = simplified(model, steps, runs, test, faults)?;
-    let model = reconsidered(model, steps, classes, runs, test, faults)?;
-    sharpened(model, runs, test, faults)
+    let mut best = Refined::new(model, runs, test, faults);
+    simplified(&mut best, steps)?;
+    reconsidered(&mut best, steps, classes)?;
+    sharpened(&mut best)?;
+    Ok(best.model)
 }
 
 /// A simpler effect takes the place of an added one that contains it where the error hardly grows:
 /// what looked like breakaway friction may have been friction with a delay that was still missing.
 /// The step that added it is then one that added the simpler effect.
-fn simplified(
-    model: Model,
-    steps: &mut [Step],
-    runs: &[Run],
-    test: Option<&[Run]>,
-    faults: &[Fault],
-) -> Result<Model, FitError> {
-    let mut best = Refined::new(model, runs, test, faults);
+fn simplified(best: &mut Refined<'_>, steps: &mut [Step]) -> Result<(), FitError> {
     for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
         let instances = instances(&best.model, place);
         let Some(effect) = instances.first().map(|i| &best.model.effects[*i]) else {
@@ -52,20 +47,16 @@ fn simplified(
             }
         }
     }
-    Ok(best.model)
+    Ok(())
 }
 
 /// What the data could not tell from an effect when it was added may be told from it once another
 /// one is there: a late command from a late sensor, when the machine has friction.
 fn reconsidered(
-    model: Model,
+    best: &mut Refined<'_>,
     steps: &mut [Step],
     classes: &[Vec<Place>],
-    runs: &[Run],
-    test: Option<&[Run]>,
-    faults: &[Fault],
-) -> Result<Model, FitError> {
-    let mut best = Refined::new(model, runs, test, faults);
+) -> Result<(), FitError> {
     for (step, class) in steps.iter_mut().zip(classes) {
         let Some(place) = step.added.as_mut() else {
             continue;
@@ -78,7 +69,7 @@ fn reconsidered(
             }
         }
     }
-    Ok(best.model)
+    Ok(())
 }
 
 /// The model with the effect of `other` in the place of that of `place`; parameters of the same name
@@ -186,13 +177,7 @@ const SHARPER: f64 = 0.99;
 const HALVINGS: usize = 3;
 
 /// The sign of the effect added last is smoothed over less and less while the error falls by it.
-fn sharpened(
-    model: Model,
-    runs: &[Run],
-    test: Option<&[Run]>,
-    faults: &[Fault],
-) -> Result<Model, FitError> {
-    let mut best = Refined::new(model, runs, test, faults);
+fn sharpened(best: &mut Refined<'_>) -> Result<(), FitError> {
     for _ in 0..HALVINGS {
         let mut candidate = best.model.clone();
         let Some(effect) = candidate.effects.last() else {
@@ -210,5 +195,5 @@ fn sharpened(
             break;
         }
     }
-    Ok(best.model)
+    Ok(())
 }
