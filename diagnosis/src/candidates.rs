@@ -21,6 +21,9 @@ pub(crate) struct Candidate {
     pub(crate) model: Model,
     /// Root mean square of the flow at its channels in the recording; 0 where there is none.
     pub(crate) flow: f64,
+    /// It reads a position, and free runs are not held to the measurements: it can be tried at the
+    /// positions as they were measured.
+    pub(crate) by_position: bool,
     /// Widths over which signs of all effects are smoothed at first, by index of the parameter.
     pub(crate) widths: Vec<(usize, f64)>,
 }
@@ -62,7 +65,7 @@ impl Candidate {
     /// depends on others linearly: with the positions as measured, those are a regression's.
     pub(crate) fn shape(&self) -> Option<Vec<usize>> {
         let linear = |i: &usize| self.model.parameters[*i].declaration.linear;
-        let regressed = Positions::matter_to(self.meta) && self.own().any(|i| linear(&i));
+        let regressed = self.by_position && self.own().any(|i| linear(&i));
         regressed.then(|| self.own().filter(|i| !linear(i)).collect())
     }
 
@@ -118,8 +121,9 @@ impl Candidate {
 /// contains an effect that the model has there takes its place.
 ///
 /// `rms` holds the root mean squares of the plant's signals in the recording: smoothing widths are
-/// set from it, since what suits a robot's wheels does not suit a flywheel.
-pub(crate) fn candidates(model: &Model, rms: &[f64]) -> Vec<Candidate> {
+/// set from it, since what suits a robot's wheels does not suit a flywheel. `held` says that an observer
+/// holds the free runs to the measurements.
+pub(crate) fn candidates(model: &Model, rms: &[f64], held: bool) -> Vec<Candidate> {
     let mut found = Vec::new();
     for meta in registry::effects() {
         for at in channel_sets(model, meta) {
@@ -164,6 +168,7 @@ pub(crate) fn candidates(model: &Model, rms: &[f64]) -> Vec<Candidate> {
                         at: at.clone(),
                         separate: *separate,
                         replaces: replaces.clone(),
+                        by_position: !held && Positions::matter_to(meta),
                         widths: widths(&model, rms),
                         model,
                         flow,

@@ -100,6 +100,9 @@ pub(crate) fn diagnose_above(
     let start = problem.start(&FitSettings::default())?;
     let start = problem.balance(start);
     let nominal = problem.finish(&start, FINAL)?;
+    let plain = problem
+        .residual_vector(&problem.pack(&nominal.values, &nominal.states))
+        .norm_squared();
     let nominal_losses = holdout.judge(model, &nominal);
     let nominal_rank = holdout.rank(model, &nominal, &nominal_losses);
     let nominal_error = nrmse(&nominal_losses);
@@ -108,7 +111,8 @@ pub(crate) fn diagnose_above(
     fitted_nominal.set_values(&nominal.values);
 
     let rms = signal_rms(model, &nominal.values, &nominal.states, runs);
-    let all = candidates(&fitted_nominal, &rms);
+    let held = runs.iter().any(|run| run.observer.is_some());
+    let all = candidates(&fitted_nominal, &rms, held);
     let done = AtomicU64::new(0);
     let duration = runs.iter().map(Run::duration).fold(0.0, f64::max);
     let attempts: Vec<(usize, Vec<f64>)> = all
@@ -126,7 +130,7 @@ pub(crate) fn diagnose_above(
         .par_iter()
         .enumerate()
         .filter_map(|(k, (i, start))| {
-            let promise = promise(&all[*i].chosen(start), start, &holdout, &nominal);
+            let promise = promise(&all[*i].chosen(start), start, &holdout, &nominal, plain);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
             Some((promise?, k))
         })

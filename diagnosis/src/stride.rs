@@ -6,15 +6,16 @@ use nalgebra::DVector;
 use crate::problem::Problem;
 
 impl Problem<'_> {
-    /// Cost that one full Gauss–Newton step from `values` would reach if the model were linear in
-    /// its unknowns.
-    pub(crate) fn promise(&self, values: &[f64], states: &[DVector<f64>]) -> Option<f64> {
+    /// Cost at `values`, and the one that a full Gauss–Newton step would reach if the model were linear
+    /// in its unknowns.
+    pub(crate) fn promise(&self, values: &[f64], states: &[DVector<f64>]) -> Option<(f64, f64)> {
         let (residual, jacobian) = self.linearise(&self.pack(values, states));
         let gram = jacobian.tr_mul(&jacobian);
         let right = jacobian.tr_mul(&residual);
         let step = pseudo_inverse(&gram)? * &right;
-        let cost = residual.norm_squared() - right.dot(&step);
-        cost.is_finite().then_some(cost.max(0.0))
+        let before = residual.norm_squared();
+        let after = before - right.dot(&step);
+        after.is_finite().then_some((before, after.max(0.0)))
     }
 
     /// The values that a full Gauss–Newton step from `values` leads to, those at `fixed` as they are.

@@ -192,12 +192,17 @@ fn coarse(candidate: &Candidate, steps: f64) -> Model {
     model
 }
 
-/// What a candidate promises to leave of the cost, from one start.
+/// Share of the cost that a regression must promise to leave less than: others begin a step away from
+/// the plain model, and may do worse at first.
+const PROMISING: f64 = 0.99;
+
+/// What a candidate promises to leave of the cost, from one start; the plain model leaves `plain`.
 pub(crate) fn promise(
     candidate: &Candidate,
     start: &[f64],
     holdout: &Holdout<'_>,
     nominal: &Solution,
+    plain: f64,
 ) -> Option<f64> {
     let steps = if Positions::matter_to(candidate.meta) {
         LOOK_STEPS
@@ -206,15 +211,21 @@ pub(crate) fn promise(
     };
     let mut model = coarse(candidate, steps);
     // While what is linear in it is neutral, its shape says nothing: a pass of derivatives less.
-    for index in candidate.shape().unwrap_or_default() {
-        model.parameters[index].free = false;
-        model.parameters[index].value = Some(start[index]);
+    let shape = candidate.shape();
+    for index in shape.iter().flatten() {
+        model.parameters[*index].free = false;
+        model.parameters[*index].value = Some(start[*index]);
     }
     let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
     let mut problem =
         Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {}).ok()?;
     problem.positions = positions(candidate, start);
-    problem.promise(start, &states)
+    let (before, after) = problem.promise(start, &states)?;
+    match shape {
+        // With measured positions also the plain model leaves less than in its free run.
+        Some(_) => (after < PROMISING * before).then(|| plain * after / before),
+        None => Some(after),
+    }
 }
 
 /// Where the candidate reads a position it is first tried at the measured ones.
