@@ -54,8 +54,6 @@ pub fn improve(
 ) -> Result<Improvement, FitError> {
     let mut present = model.clone();
     let mut steps: Vec<Step> = Vec::new();
-    // By step: what the data could not tell from what it added.
-    let mut classes: Vec<Vec<Place>> = Vec::new();
     let mut diagnoses = Vec::new();
     let mut first = None;
     let verdict = loop {
@@ -74,7 +72,6 @@ pub fn improve(
                 nrmse_fit: diagnosis.nominal_fit,
                 nrmse_test: diagnosis.nominal.nrmse,
             });
-            classes.push(Vec::new());
             present = fitted.clone();
         }
         let next = match (&diagnosis.missing, diagnosis.candidates.first()) {
@@ -88,8 +85,14 @@ pub fn improve(
             nrmse_fit: best.nrmse_fit,
             nrmse_test: best.nrmse,
         });
-        present = refine(best.model, &mut steps, &classes, runs, test, faults)?;
-        classes.push(best.indistinguishable_from);
+        present = refine(
+            best.model,
+            &mut steps,
+            &diagnoses[..round],
+            runs,
+            test,
+            faults,
+        )?;
     };
     let best = match verdict {
         Conclusion::LogFaulty | Conclusion::DataInsufficient => None,

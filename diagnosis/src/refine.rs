@@ -5,24 +5,24 @@ use loopsight_core::run::Run;
 use loopsight_recordings::Fault;
 
 use crate::candidates::{is_width, smooth};
-use crate::conclusion::Place;
+use crate::conclusion::{Diagnosis, Place};
 use crate::fit::{FitError, FitSettings, fit};
 use crate::improve::Step;
 
 /// The model to go on from after the last of `steps`, fitted: simpler effects and others that the data
-/// could not tell from those of the steps (their `classes`) take their places where they may, and the
-/// steps then name them.
+/// could not tell from those of earlier steps (by the `diagnoses` that added them) take their places
+/// where they may, and the steps then name them.
 pub(crate) fn refine(
     model: Model,
     steps: &mut [Step],
-    classes: &[Vec<Place>],
+    diagnoses: &[Diagnosis],
     runs: &[Run],
     test: Option<&[Run]>,
     faults: &[Fault],
 ) -> Result<Model, FitError> {
     let mut best = Refined::new(model, runs, test, faults);
     simplified(&mut best, steps)?;
-    reconsidered(&mut best, steps, classes)?;
+    reconsidered(&mut best, steps, diagnoses)?;
     sharpened(&mut best)?;
     Ok(best.model)
 }
@@ -55,13 +55,15 @@ fn simplified(best: &mut Refined<'_>, steps: &mut [Step]) -> Result<(), FitError
 fn reconsidered(
     best: &mut Refined<'_>,
     steps: &mut [Step],
-    classes: &[Vec<Place>],
+    diagnoses: &[Diagnosis],
 ) -> Result<(), FitError> {
-    for (step, class) in steps.iter_mut().zip(classes) {
+    // The first step is the model as it was.
+    for (step, diagnosis) in steps.iter_mut().skip(1).zip(diagnoses) {
+        let class = diagnosis.candidates.first();
         let Some(place) = step.added.as_mut() else {
             continue;
         };
-        for other in class {
+        for other in class.iter().flat_map(|c| &c.indistinguishable_from) {
             let candidate = exchanged(&best.model, place, other);
             if best.takes(candidate, BETTER)? {
                 *place = other.clone();
