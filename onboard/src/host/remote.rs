@@ -43,15 +43,8 @@ impl Remote {
                 break act;
             }
         };
-        for (to, from) in command.iter_mut().zip(&act.command) {
-            *to = f64::from(*from);
-        }
-        self.told.take(&act);
         self.tick = self.tick.wrapping_add(1);
-        Ok(Command {
-            saturated: act.saturated,
-            held: act.held,
-        })
+        Ok(self.told.take(&act, command))
     }
 }
 

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::conversation::Conversation;
 use super::remote::kind;
-use super::told::Told;
+use super::told::{Told, widen};
 use super::{Aboard, Line, LineError, baud, rate, timeout, waits};
 
 /// A robot with motors and encoders of its own, which runs its loop by its own timer: the host tells it what
@@ -188,9 +188,7 @@ impl Body {
         let sensed = act.sensed.as_ref().map_or(&[][..], |s| &s.measured);
         talk.robot
             .sized("measurements", sensed.len(), self.measured.len())?;
-        for (to, from) in self.measured.iter_mut().zip(sensed) {
-            *to = f64::from(*from);
-        }
+        widen(&mut self.measured, sensed);
         talk.act = Some(act);
         Ok(true)
     }
@@ -219,10 +217,7 @@ impl Driver<f64> for Body {
     /// Nothing is written: the robot did what it says.
     fn write(&mut self, _command: &[f64], applied: &mut [f64]) -> Result<(), HostDriverError> {
         let talk = held(&self.talk);
-        let act = talk.act.as_ref();
-        for (to, from) in applied.iter_mut().zip(act.map_or(&[][..], |a| &a.command)) {
-            *to = f64::from(*from);
-        }
+        widen(applied, talk.act.as_ref().map_or(&[][..], |a| &a.command));
         Ok(())
     }
 
@@ -260,18 +255,9 @@ impl Controller<f64> for Law {
         let Some(act) = &talk.act else {
             return Err(ControlError::NoAnswer);
         };
-        for (to, from) in command.iter_mut().zip(&act.command) {
-            *to = f64::from(*from);
-        }
         let followed = act.sensed.as_ref().map_or(&[][..], |s| &s.reference);
-        for (to, from) in self.followed.iter_mut().zip(followed) {
-            *to = f64::from(*from);
-        }
-        self.told.take(act);
-        Ok(Command {
-            saturated: act.saturated,
-            held: act.held,
-        })
+        widen(&mut self.followed, followed);
+        Ok(self.told.take(act, command))
     }
 
     fn demand(&self, reference: &mut [f64]) {

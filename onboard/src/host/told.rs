@@ -1,7 +1,7 @@
 //! What a robot tells of itself beside its commands.
 
-use loopsight_core::Quantity;
 use loopsight_core::model::Model;
+use loopsight_core::{Command, Quantity};
 use loopsight_link::Act;
 
 /// What the robot learned and, where it has sensors of its own, its supply.
@@ -40,11 +40,17 @@ impl Told {
         self
     }
 
-    pub(super) fn take(&mut self, act: &Act) {
+    /// Takes what the robot did in a tick: its command, and what it tells beside it.
+    pub(super) fn take(&mut self, act: &Act, command: &mut [f64]) -> Command {
+        widen(command, &act.command);
         let learned = self.learned.iter().map(|i| act.parameters.get(*i));
         let supply = act.sensed.as_ref().map(|s| &s.supply);
         for (to, from) in self.values.iter_mut().zip(learned.chain([supply])) {
             *to = from.map_or(f64::NAN, |v| f64::from(*v));
+        }
+        Command {
+            saturated: act.saturated,
+            held: act.held,
         }
     }
 
@@ -54,5 +60,12 @@ impl Told {
 
     pub(super) fn values(&self) -> &[f64] {
         &self.values
+    }
+}
+
+/// A robot's single precision in the host's double.
+pub(super) fn widen(to: &mut [f64], from: &[f32]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = f64::from(*from);
     }
 }
