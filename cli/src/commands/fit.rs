@@ -1,6 +1,7 @@
 //! `loopsight fit`.
 
 use indicatif::ProgressBar;
+use loopsight_core::Parameter;
 use loopsight_core::config::Step;
 use loopsight_diagnosis::{Fit, FitSettings, Method, Scheme, fit};
 use loopsight_report::{Context, fit_page, save};
@@ -87,10 +88,23 @@ fn fitted_text(loaded: &Loaded, fit: &Fit) -> String {
         .filter(|(new, old)| old.free && new.value != old.value)
         .filter_map(|(new, _)| {
             let error = fit.parameters.get(&new.name).and_then(|p| p.std_error);
-            Some((new.path.clone(), legible(new.value?, error)))
+            Some((
+                new.path.clone(),
+                written(new.declaration, new.value?, error),
+            ))
         })
         .collect();
     loaded.source.with_values(&values)
+}
+
+/// What the file says for `value`: legible, but within the range of the `parameter`.
+fn written(parameter: &Parameter, value: f64, std_error: Option<f64>) -> f64 {
+    let legible = legible(value, std_error);
+    if parameter.admits(legible) {
+        legible
+    } else {
+        value
+    }
 }
 
 /// `value` to about a thousandth of its standard error: the digits behind that are noise.
@@ -136,5 +150,12 @@ mod tests {
         assert_eq!(legible(-15.146_524_758_853, Some(5.2e-4)), -15.146_524_8);
         assert_eq!(legible(12_345.678_9, Some(2.0e5)), 12_346.0);
         assert_eq!(legible(0.136_003_798_643, None), 0.136_003_798_643);
+    }
+
+    #[test]
+    fn no_number_leaves_its_range() {
+        let speed = Parameter::new("speed", "v", "flow", "decay").above(0.0);
+        assert_eq!(written(&speed, 1e-6, Some(23.8)), 1e-6);
+        assert_eq!(written(&speed, 1.234_567_8, Some(23.8)), 1.23);
     }
 }
