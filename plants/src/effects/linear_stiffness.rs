@@ -16,7 +16,8 @@ use loopsight_core::{
 /// | `stiffness` | force per way | that of the channel over that of the position |
 /// | `rest` | position without force | that of the position |
 ///
-/// Assumptions: no hysteresis, no stop at the end of the travel. `rest` is not estimated unless
+/// Assumptions: no hysteresis, no stop at the end of the travel; it pulls towards rest (a force that
+/// pushes away from it is a weight above its pivot, `gravity_pendulum`, not a spring). `rest` is not estimated unless
 /// the file frees it: the position of most logs begins at rest; a constant force beside the spring
 /// moves it.
 ///
@@ -37,6 +38,7 @@ impl Effect<2, 0> for LinearStiffness {
         reads: &[Role::Position],
         parameters: &[
             Parameter::new("stiffness", "k", "channel/position", "force per way")
+                .within(0.0, f64::INFINITY)
                 .or(0.0)
                 .scaled(0.05),
             Parameter::new("rest", "x_0", "position", "position without force")
@@ -44,6 +46,7 @@ impl Effect<2, 0> for LinearStiffness {
                 .known()
                 .nonlinear(),
         ],
+        rarity: 2,
         ..EffectMeta::PLAIN
     };
 
