@@ -68,10 +68,17 @@ pub(crate) fn choose(
             .cmp(&key(**b))
             .then(error(**a).total_cmp(&error(**b)))
     })?;
-    let class: Vec<Place> = not_worse
-        .iter()
-        .filter(|i| **i != chosen && complexity(**i) <= complexity(chosen))
-        .map(|i| explanations[*i].place.clone())
+    // And another effect that does as well as the chosen one on what no fit saw.
+    let unseen = |i: usize| nrmse(&finalists[i].0.losses);
+    let id = |i: usize| finalists[i].0.candidate.meta.id;
+    let as_well = |i: usize| {
+        let near = unseen(i) <= unseen(chosen) && error(i) < FAR * error(chosen);
+        near && id(i) != id(chosen)
+    };
+    let class: Vec<Place> = (0..finalists.len())
+        .filter(|i| not_worse.contains(i) || as_well(*i))
+        .filter(|i| *i != chosen && complexity(*i) <= complexity(chosen))
+        .map(|i| explanations[i].place.clone())
         .collect();
     explanations[chosen].indistinguishable_from = class;
     let first = explanations.remove(chosen);

@@ -15,6 +15,9 @@ use crate::refine::refine;
 pub struct Step {
     /// What was added, under the name that it has in the best model; `null` for the model as it was.
     pub added: Option<Place>,
+    /// The round whose diagnosis named it: its place among [`Improvement::diagnoses`].
+    #[serde(skip)]
+    pub round: usize,
     /// Free-run error on what the model was fitted to.
     pub nrmse_fit: f64,
     /// Free-run error on what it was not fitted to.
@@ -34,6 +37,23 @@ pub struct Improvement {
     /// The best model, fitted to all of the log; none where a diagnosis was refused.
     #[serde(skip)]
     pub best: Option<Fit>,
+}
+
+impl Improvement {
+    /// What the data could not tell from the effect of a step when it was added.
+    pub fn not_told_from(&self, step: &Step) -> Vec<&Place> {
+        let named = self
+            .diagnoses
+            .get(step.round)
+            .and_then(|d| d.candidates.first());
+        let (Some(added), Some(named)) = (&step.added, named) else {
+            return Vec::new();
+        };
+        std::iter::once(&named.place)
+            .chain(&named.indistinguishable_from)
+            .filter(|place| *place != added)
+            .collect()
+    }
 }
 
 /// Share of the first error that a further effect must account for: beyond it a library finds
@@ -69,6 +89,7 @@ pub fn improve(
             first = Some(diagnosis.nominal.nrmse);
             steps.push(Step {
                 added: None,
+                round,
                 nrmse_fit: diagnosis.nominal_fit,
                 nrmse_test: diagnosis.nominal.nrmse,
             });
@@ -82,6 +103,7 @@ pub fn improve(
         let Some(best) = next else { break verdict };
         steps.push(Step {
             added: Some(best.place.clone()),
+            round,
             nrmse_fit: best.nrmse_fit,
             nrmse_test: best.nrmse,
         });

@@ -3,28 +3,58 @@
 use loopsight_core::model::{Attached, Model};
 use loopsight_core::run::Run;
 use loopsight_recordings::Fault;
+use rayon::prelude::*;
 
 use crate::candidates::{is_width, smooth};
 use crate::conclusion::{Diagnosis, Place};
+use crate::diagnose::CLOSE;
 use crate::fit::{FitError, FitSettings, fit};
 use crate::improve::Step;
 
-/// The model to go on from after the last of `steps`, fitted: simpler effects and others that the data
-/// could not tell from those of earlier steps (by the `diagnoses` that added them) take their places
-/// where they may, and the steps then name them.
+/// The model to go on from after the last of `steps`, fitted: what the last one made needless goes, and
+/// its step with it; simpler effects and others that the data could not tell from those of earlier
+/// steps (by the `diagnoses` that added them) take their places where they may, and the steps then
+/// name them.
 pub(crate) fn refine(
     model: Model,
-    steps: &mut [Step],
+    steps: &mut Vec<Step>,
     diagnoses: &[Diagnosis],
     runs: &[Run],
     test: Option<&[Run]>,
     faults: &[Fault],
 ) -> Result<Model, FitError> {
     let mut best = Refined::new(model, runs, test, faults);
+    needless(&mut best, steps)?;
     simplified(&mut best, steps)?;
     reconsidered(&mut best, steps, diagnoses)?;
     sharpened(&mut best)?;
     Ok(best.model)
+}
+
+/// What an earlier step added goes where the error is the same without it: what looked like a dead zone
+/// may have been a part of the friction that was added after it.
+fn needless(best: &mut Refined<'_>, steps: &mut Vec<Step>) -> Result<(), FitError> {
+    loop {
+        // The last is what was just found missing.
+        let earlier = steps.iter().enumerate().take(steps.len().saturating_sub(1));
+        let candidates = earlier.filter_map(|(index, step)| {
+            let instances = instances(&best.model, step.added.as_ref()?);
+            let gone = !instances.is_empty();
+            gone.then(|| Some((index, without(&best.model, &instances)?)))?
+        });
+        match best.takes(candidates.collect(), CLOSE)? {
+            Some(index) => drop(steps.remove(index)),
+            None => return Ok(()),
+        }
+    }
+}
+
+/// The model without some of its effects.
+fn without(model: &Model, effects: &[usize]) -> Option<Model> {
+    effects
+        .iter()
+        .rev()
+        .try_fold(model.clone(), |model, index| model.without_effect(*index))
 }
 
 /// A simpler effect takes the place of an added one that contains it where the error hardly grows:
@@ -36,15 +66,15 @@ fn simplified(best: &mut Refined<'_>, steps: &mut [Step]) -> Result<(), FitError
         let Some(effect) = instances.first().map(|i| &best.model.effects[*i]) else {
             continue;
         };
-        for id in effect.meta.simpler {
+        let simpler = effect.meta.simpler.iter().filter_map(|id| {
             let candidate = instances.iter().try_fold(best.model.clone(), |model, i| {
                 let at: Vec<&str> = model.effects[*i].at.iter().map(|c| c.id).collect();
                 model.with_effect_replaced(*i, id, &at)
             });
-            if best.takes(candidate, SIMPLER)? {
-                (*id).clone_into(&mut place.effect);
-                break;
-            }
+            Some((*id, candidate?))
+        });
+        if let Some(id) = best.takes(simpler.collect(), SIMPLER)? {
+            id.clone_into(&mut place.effect);
         }
     }
     Ok(())
@@ -57,18 +87,16 @@ fn reconsidered(
     steps: &mut [Step],
     diagnoses: &[Diagnosis],
 ) -> Result<(), FitError> {
-    // The first step is the model as it was.
-    for (step, diagnosis) in steps.iter_mut().skip(1).zip(diagnoses) {
-        let class = diagnosis.candidates.first();
+    for step in steps {
+        let class = diagnoses.get(step.round).and_then(|d| d.candidates.first());
         let Some(place) = step.added.as_mut() else {
             continue;
         };
-        for other in class.iter().flat_map(|c| &c.indistinguishable_from) {
-            let candidate = exchanged(&best.model, place, other);
-            if best.takes(candidate, BETTER)? {
-                *place = other.clone();
-                break;
-            }
+        let others = class.iter().flat_map(|c| &c.indistinguishable_from);
+        let candidates =
+            others.filter_map(|other| Some((other, exchanged(&best.model, place, other)?)));
+        if let Some(other) = best.takes(candidates.collect(), BETTER)? {
+            *place = other.clone();
         }
     }
     Ok(())
@@ -85,12 +113,8 @@ fn exchanged(model: &Model, place: &Place, other: &Place) -> Option<Model> {
         .iter()
         .map(|p| p.id)
         .collect();
-    let mut candidate = model.clone();
-    for index in others.iter().rev() {
-        candidate = candidate.without_effect(*index)?;
-    }
     let at: Vec<&str> = other.at.iter().map(String::as_str).collect();
-    candidate = candidate.with_effect_replaced(*first, &other.effect, &at)?;
+    let mut candidate = without(model, others)?.with_effect_replaced(*first, &other.effect, &at)?;
     let effect = &candidate.effects[*first];
     let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
     for parameter in &mut candidate.parameters[own] {
@@ -123,22 +147,34 @@ impl<'a> Refined<'a> {
         }
     }
 
-    /// Whether `candidate`, fitted, takes the place: where its error is below `share` of the present one.
-    fn takes(&mut self, candidate: Option<Model>, share: f64) -> Result<bool, FitError> {
-        let Some(candidate) = candidate else {
-            return Ok(false);
-        };
+    /// The best of `candidates`, each fitted, takes the place where its error is below `share` of the
+    /// present one. Those that cannot be fitted (their free run diverges) are none.
+    fn takes<T: Send>(
+        &mut self,
+        candidates: Vec<(T, Model)>,
+        share: f64,
+    ) -> Result<Option<T>, FitError> {
+        if candidates.is_empty() {
+            return Ok(None);
+        }
+        let refitted = |model: &Model| refitted(model, self.runs, self.test, self.faults);
         let now = match self.error {
             Some(now) => now,
-            None => refitted(&self.model, self.runs, self.test, self.faults)?.0,
+            None => refitted(&self.model)?.0,
         };
         self.error = Some(now);
-        let (after, fitted) = refitted(&candidate, self.runs, self.test, self.faults)?;
-        if after.is_nan() || after > share * now {
-            return Ok(false);
-        }
-        (self.model, self.error) = (fitted, Some(after));
-        Ok(true)
+        let fitted: Vec<(T, f64, Model)> = candidates
+            .into_par_iter()
+            .filter_map(|(what, model)| {
+                let (error, model) = refitted(&model).ok()?;
+                (error <= share * now).then_some((what, error, model))
+            })
+            .collect();
+        let best = fitted.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        Ok(best.map(|(what, error, model)| {
+            (self.model, self.error) = (model, Some(error));
+            what
+        }))
     }
 }
 
@@ -193,7 +229,7 @@ fn sharpened(best: &mut Refined<'_>) -> Result<(), FitError> {
             .and_then(|i| candidate.parameters[first + i].value);
         let Some(width) = width else { break };
         smooth(&mut candidate, count, 0.5 * width);
-        if !best.takes(Some(candidate), SHARPER)? {
+        if best.takes(vec![((), candidate)], SHARPER)?.is_none() {
             break;
         }
     }

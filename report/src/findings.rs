@@ -136,6 +136,7 @@ pub(crate) fn improvement(last: Conclusion) -> Improvement {
         history: vec![],
     });
     let step = |added, nrmse_fit, nrmse_test| Step {
+        round: 0,
         added,
         nrmse_fit,
         nrmse_test,

@@ -2,7 +2,7 @@
 
 use loopsight_core::config::{Source, Step};
 use loopsight_core::model::{Attached, Model, ModelParameter};
-use loopsight_diagnosis::{Improvement, improve};
+use loopsight_diagnosis::{Improvement, Place, improve};
 use loopsight_report::{improvement_page, save};
 
 use crate::arguments::ImproveOptions;
@@ -106,6 +106,10 @@ fn best_text(source: &Source, before: &Model, best: &Model) -> String {
     present.with_values(&values)
 }
 
+fn written(place: &Place) -> String {
+    format!("{} @ {}", place.effect, place.at.join("+"))
+}
+
 fn text(improvement: &Improvement) -> String {
     let rows: Vec<Vec<String>> = improvement
         .steps
@@ -114,7 +118,7 @@ fn text(improvement: &Improvement) -> String {
             vec![
                 step.added.as_ref().map_or_else(
                     || "the model as it is".to_owned(),
-                    |p| format!("+ {} @ {}", p.effect, p.at.join("+")),
+                    |p| format!("+ {}", written(p)),
                 ),
                 output::percent(step.nrmse_fit),
                 output::percent(step.nrmse_test),
@@ -128,6 +132,20 @@ fn text(improvement: &Improvement) -> String {
             &rows,
         ));
         text.push('\n');
+    }
+    for step in &improvement.steps {
+        let others: Vec<String> = improvement
+            .not_told_from(step)
+            .iter()
+            .map(|p| written(p))
+            .collect();
+        if let (Some(added), [_, ..]) = (&step.added, &others[..]) {
+            text.push_str(&format!(
+                "not told from {} when it was added: {}\n",
+                written(added),
+                others.join(", ")
+            ));
+        }
     }
     if let Some(last) = improvement.diagnoses.last() {
         text.push_str(&sentence(last));

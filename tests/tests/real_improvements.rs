@@ -1,0 +1,227 @@
+//! The main job on real measurements, whose hidden effects nobody here chose: what `improve` names,
+//! and how the error falls. Minutes of work, so ignored: CI runs them in release. The recordings are not
+//! part of the project: the environment variable `LOOPSIGHT_DATA` names the folder that holds them.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "logs that are known to be readable, and a panic is how this program fails"
+)]
+
+use std::path::PathBuf;
+
+use assert_cmd::Command;
+use loopsight_core::model::Model;
+use loopsight_tests::repository;
+use serde_json::Value;
+
+/// What `improve` said of a log.
+struct Improved {
+    /// Names of the effects that were added, in order.
+    added: Vec<String>,
+    /// Error on what was not fitted to, at first and with each effect.
+    unseen: Vec<f64>,
+    /// Error on what was fitted to.
+    seen: Vec<f64>,
+    verdict: String,
+    /// The best model; none where it refused.
+    best: Option<Model>,
+}
+
+impl Improved {
+    /// Value of a parameter of the best model.
+    fn value(&self, name: &str) -> f64 {
+        let parameters = &self.best.as_ref().unwrap().parameters;
+        let found = parameters.iter().find(|p| p.name == name);
+        found.and_then(|p| p.value).unwrap_or(f64::NAN)
+    }
+
+    fn last(&self) -> f64 {
+        *self.unseen.last().unwrap()
+    }
+
+    /// Place of an effect among those that were added.
+    fn position(&self, effect: &str) -> Option<usize> {
+        self.added.iter().position(|e| e == effect)
+    }
+
+    /// By how much all that is late is late together, s.
+    fn late(&self) -> f64 {
+        [
+            ("sensor_delay.delay", 1.0),
+            ("sensor_lag.lag", 1.0),
+            ("sensor_window.window", 0.5),
+            ("input_delay.delay", 1.0),
+            ("actuator_lag.lag", 1.0),
+        ]
+        .iter()
+        .map(|(name, share)| (self.value(name), share))
+        .filter(|(value, _)| value.is_finite())
+        .map(|(value, share)| value * share)
+        .sum()
+    }
+}
+
+/// Improves on logs of one machine, with the model file `model` of `fixtures/real` or none; none where
+/// there is no data.
+fn improved(model: Option<&str>, logs: &[&str]) -> Option<Improved> {
+    let Some(folder) = std::env::var_os("LOOPSIGHT_DATA").map(PathBuf::from) else {
+        println!("LOOPSIGHT_DATA is not set: nothing was tested against {logs:?}");
+        return None;
+    };
+    let desk = tempfile::tempdir().unwrap();
+    let best = desk.path().join("best.toml");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_loopsight-under-test"));
+    command.arg("improve");
+    if let Some(model) = model {
+        command.arg(repository().join("tests/fixtures/real").join(model));
+    }
+    command.arg(folder.join(logs[0]));
+    for also in &logs[1..] {
+        command.arg("--also").arg(folder.join(also));
+    }
+    let output = command.arg("--json").arg("-o").arg(&best).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{logs:?}: {text}");
+    println!("{logs:?}:\n{text}");
+    let said: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let steps = said["steps"].as_array().unwrap();
+    let errors = |key: &str| steps.iter().map(|s| s[key].as_f64().unwrap()).collect();
+    let effects = steps.iter().filter_map(|s| s["added"]["effect"].as_str());
+    Some(Improved {
+        added: effects.map(str::to_owned).collect(),
+        unseen: errors("nrmse_test"),
+        seen: errors("nrmse_fit"),
+        verdict: said["verdict"].as_str().unwrap().to_owned(),
+        best: std::fs::read_to_string(&best)
+            .ok()
+            .map(|text| Model::from_toml("best.toml", &text).unwrap().0),
+    })
+}
+
+#[test]
+#[ignore = "minutes: run in release"]
+fn team4277_has_friction_and_measures_late() {
+    let Some(found) = improved(None, &["frc/team4277-drivetrain.json"]) else {
+        return;
+    };
+    assert_eq!(
+        found.position("coulomb_friction"),
+        Some(0),
+        "{:?}",
+        found.added
+    );
+    let level = found.value("coulomb_friction.level");
+    assert!((0.5..0.8).contains(&level), "{level} V");
+    assert!((0.05..0.1).contains(&found.late()), "{} s", found.late());
+    assert!(found.last() < 0.1 * found.unseen[0], "{:?}", found.unseen);
+}
+
+#[test]
+#[ignore = "minutes: run in release"]
+fn team564_straight_has_friction_and_no_delay() {
+    let Some(found) = improved(None, &["frc/team564-drivetrain-linear.json"]) else {
+        return;
+    };
+    assert_eq!(
+        found.position("coulomb_friction"),
+        Some(0),
+        "{:?}",
+        found.added
+    );
+    let level = found.value("coulomb_friction.level");
+    assert!((0.8..0.9).contains(&level), "{level} V");
+    assert!(found.late() < 0.035, "{} s", found.late());
+}
+
+/// Turning on the spot takes more than friction at the wheels: only both logs together can say so.
+#[test]
+#[ignore = "minutes: run in release"]
+fn team564_straight_and_turning_has_scrub() {
+    let logs = ["linear", "angular"].map(|kind| format!("frc/team564-drivetrain-{kind}.json"));
+    let Some(found) = improved(None, &logs.each_ref().map(String::as_str)) else {
+        return;
+    };
+    assert_eq!(found.added[..2], ["coulomb_friction", "scrub_friction"]);
+    let level = found.value("coulomb_friction.level");
+    assert!((0.8..0.9).contains(&level), "{level} V");
+    // As the voltage at both wheels that turning takes.
+    let scrub = found.value("scrub_friction.level") / found.value("K_F");
+    assert!((0.4..0.9).contains(&scrub), "{scrub} V");
+}
+
+#[test]
+#[ignore = "minutes: run in release"]
+fn team157_measures_late() {
+    let Some(found) = improved(None, &["frc/team157-drivetrain.json"]) else {
+        return;
+    };
+    assert_eq!(
+        found.position("coulomb_friction"),
+        Some(0),
+        "{:?}",
+        found.added
+    );
+    assert!(found.late() > 0.1, "{} s", found.late());
+    assert!(found.last() < 0.4 * found.unseen[0], "{:?}", found.unseen);
+}
+
+#[test]
+#[ignore = "minutes: run in release"]
+fn denhams_flywheel_has_friction_and_measures_late() {
+    let Some(found) = improved(None, &["frc/denham-flywheel.json"]) else {
+        return;
+    };
+    assert_eq!(
+        found.position("coulomb_friction"),
+        Some(0),
+        "{:?}",
+        found.added
+    );
+    let level = found.value("coulomb_friction.level");
+    assert!((0.65..0.75).contains(&level), "{level} V");
+    assert!((0.11..0.135).contains(&found.late()), "{} s", found.late());
+    assert_eq!(found.verdict, "nothing_missing");
+}
+
+/// An arm that moves over 0.23 rad cannot carry its model, and the reason is said.
+#[test]
+fn team581s_arm_is_refused() {
+    let Some(found) = improved(None, &["frc/team581-arm.json"]) else {
+        return;
+    };
+    assert_eq!(found.verdict, "data_insufficient");
+    assert!(found.best.is_none());
+}
+
+#[test]
+#[ignore = "minutes: run in release"]
+fn emps_has_friction_of_its_directions() {
+    let Some(found) = improved(Some("emps.toml"), &["emps/emps_estimation.csv"]) else {
+        return;
+    };
+    assert!(
+        found.position("directional_friction").is_some(),
+        "{:?}",
+        found.added
+    );
+}
+
+/// A threshold, of one kind or another; the difference of the directions; and a free run at 3.3 % of the
+/// standard deviation or less.
+#[test]
+#[ignore = "minutes: run in release"]
+fn a_geared_motor_has_a_threshold_and_two_directions() {
+    let log = "dc-motor-deadzone/dc_motor_staircase.csv";
+    let Some(found) = improved(Some("geared_motor.toml"), &[log]) else {
+        return;
+    };
+    let threshold = ["stribeck_friction", "coulomb_friction", "dead_zone"];
+    assert!(
+        threshold.contains(&found.added[0].as_str()),
+        "{:?}",
+        found.added
+    );
+    let directions = ["constant_force", "input_offset", "directional_friction"];
+    assert!(found.added.iter().any(|e| directions.contains(&e.as_str())));
+    assert!(*found.seen.last().unwrap() < 0.033, "{:?}", found.seen);
+}
