@@ -44,6 +44,9 @@ pub struct EffectMeta {
     /// It looks back in time at its channel, through [`Reading::past`]. Such effects are evaluated
     /// first at their channel, once per integration step.
     pub memory: bool,
+    /// Longest integration step that follows its states, s: a model with it takes none longer, whatever
+    /// its plant and its file allow.
+    pub max_step_s: f64,
 }
 
 impl EffectMeta {
@@ -66,6 +69,7 @@ impl EffectMeta {
         parameters: &[],
         states: 0,
         memory: false,
+        max_step_s: f64::INFINITY,
     };
 }
 

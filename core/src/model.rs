@@ -406,6 +406,13 @@ impl Model {
         f64::dynamics(self.dynamics).max_step_s()
     }
 
+    /// Longest integration step that is taken, s: [`Model::max_step`], or what an effect asks for with
+    /// [`EffectMeta::max_step_s`](crate::EffectMeta::max_step_s).
+    pub fn step(&self) -> f64 {
+        let effects = self.effects.iter().map(|e| e.meta.max_step_s);
+        effects.fold(self.max_step, f64::min)
+    }
+
     /// Parameters of the plant's equations from the model's values.
     pub fn lower<S: HostReal>(&self, values: &[S]) -> Vec<S> {
         let mut p = vec![S::zero(); self.plant.parameters.len()];

@@ -120,6 +120,15 @@ impl Driven {
         }
     }
 
+    /// Voltage per speed of a shaft that the damping is, back-emf and viscous friction, V s/rad.
+    pub(crate) fn back_emf(self, wheel_radius: f64) -> f64 {
+        let k = self.lumped();
+        match self {
+            Driven::Twil => -k.k_a * wheel_radius / (2.0 * k.k_c),
+            Driven::Axis => -k.k_a / k.k_c,
+        }
+    }
+
     /// [`Driven::lumped`] by name.
     pub(crate) fn quantities(self) -> Vec<Quantity> {
         let k = self.lumped();

@@ -274,6 +274,21 @@ fn scales_are_noticed_and_every_parameter_has_its_exact_derivative() {
     });
 }
 
+/// A first look takes steps of 10 ms: they follow every effect, or it asks for shorter ones, which it gets.
+#[test]
+fn long_steps_follow_every_effect() {
+    each_case(|name, with, own, _| {
+        let values = noticeable(&with, own);
+        let usual = simulate(&with, &values);
+        let mut long = with.clone();
+        long.max_step = 0.01;
+        let asked = long.step() < long.max_step;
+        let off = difference(&simulate(&long, &values), &usual);
+        let most = if asked { 0.0 } else { 0.05 };
+        assert!(off <= most, "{name}: {off}");
+    });
+}
+
 /// Where a fit starts from neutral, it must see which way to go.
 #[test]
 fn a_fit_can_leave_the_defaults() {
@@ -285,7 +300,8 @@ fn a_fit_can_leave_the_defaults() {
             }
             let values = with.values();
             let exact = derivatives(&with, &values, i);
-            let step = 1e-5 * parameter.scale();
+            // Shorter than for a scale: a gear whose drive fades away comes to lie within any play.
+            let step = 3e-7 * parameter.scale();
             let mut moved = values.clone();
             moved[i] += step;
             let moved = simulate(&with, &moved);

@@ -190,7 +190,8 @@ fn what_is_not_compensated_says_why() {
     for (text, why) in [
         (format!("[effect.backlash]\n{wheels}\nplay = 0.1"), "a state of its own"),
         (format!("[effect.torque_ripple]\n{wheels}\ncount = 7.0\nsine = 0.3"), "which is not measured"),
-        (format!("[effect.wheel_slip]\n{wheels}\nlimit = 5.0"), "depends on the command"),
+        (format!("[effect.wheel_slip]\n{wheels}\nlimit = 5.0"), "a state of its own"),
+        (format!("[effect.expression]\n{wheels}\nforce = \"-0.01*drive^2\""), "depends on the command"),
         ("[effect.payload_change]\nat = [\"inertia.forward\", \"inertia.yaw\"]\nfraction = 0.3\ntime = 12.0".to_owned(), "time of a recording"),
         ("[effect.gravity_slope]\nat = [\"body.forward\"]\nsine = 0.3".to_owned(), "`heading`, which is not measured"),
     ] {

@@ -53,6 +53,8 @@ pub struct Simulator<'m, S> {
     needed: Vec<usize>,
     time: f64,
     interval: f64,
+    /// Longest integration step, s.
+    longest: f64,
     /// How fast each input changes within the interval that is integrated, per second.
     slopes: Vec<f64>,
     /// Inputs that run on straight lines between samples.
@@ -138,6 +140,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             bounds,
             time: 0.0,
             interval: 0.0,
+            longest: model.step(),
             slopes: vec![0.0; nu],
             ramped: (0..nu)
                 .filter(|i| model.hold(*i) == Hold::FirstOrder)
@@ -264,7 +267,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         }
         let span = until - self.time;
         let start = self.time;
-        let steps = substeps(span, self.model.max_step);
+        let steps = substeps(span, self.longest);
         let h = span / steps as f64;
         for step in 0..steps {
             let elapsed = h * step as f64;

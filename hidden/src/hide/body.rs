@@ -54,8 +54,8 @@ pub(super) fn offset(m: &mut Physics, mut of: Concealed) -> Concealed {
         .physical("mass_offset", offset, "m")
 }
 
-/// Tyres with a coefficient of friction of 0.2. The limit in volts is that of fast sliding, of a
-/// robot that goes straight on: of the motors' torque the rotors and wheels keep the share `1 - m/M` that accelerates them.
+/// Tyres with a coefficient of friction of 0.2. The limit in volts is that of the peak, the time constant
+/// that of a wheel with its rotor against the damping of its motor.
 pub(super) fn slip(m: &mut Physics, mut of: Concealed) -> Concealed {
     let tyre = Tyre {
         friction: 0.2 / of.size,
@@ -63,15 +63,22 @@ pub(super) fn slip(m: &mut Physics, mut of: Concealed) -> Concealed {
     };
     m.tyre = Some(tyre);
     let traction = tyre.friction * 0.5 * m.body.mass * GRAVITY;
-    let passed_on = m.body.mass / effective(m)[0];
-    let sliding = Tyre::sliding() * traction;
-    let limit = sliding * m.body.wheel_radius / m.motor.torque_per_volt() / passed_on;
+    let sliding = Tyre::sliding();
+    let torque_per_volt = m.motor.torque_per_volt();
+    let turning = m.motor.reflected_inertia + m.body.wheel_inertia;
+    let damping = torque_per_volt * m.robot.back_emf(m.body.wheel_radius);
     of.approximate = true;
-    of.fitted("limit", limit, "V")
-        .physical("friction", tyre.friction, "1")
-        .physical("largest_traction", traction, "N")
-        .physical("sliding_traction", sliding, "N")
-        .physical("slip_scale", tyre.slip, "m/s")
+    of.fitted(
+        "limit",
+        traction * m.body.wheel_radius / torque_per_volt,
+        "V",
+    )
+    .fitted("sliding", sliding, "1")
+    .fitted("wheel", turning / damping, "s")
+    .physical("friction", tyre.friction, "1")
+    .physical("largest_traction", traction, "N")
+    .physical("sliding_traction", sliding * traction, "N")
+    .physical("slip_scale", tyre.slip, "m/s")
 }
 
 /// Something of 7.2 kg and 0.16 kg m², put on board after 9.7 s.

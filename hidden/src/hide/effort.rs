@@ -2,7 +2,6 @@
 //! drive the machine, 0.9 V is 10 %.
 
 use crate::contact::Gap;
-use crate::driven::Driven;
 use crate::physics::{Cogging, Physics};
 use crate::truth::Concealed;
 
@@ -101,7 +100,7 @@ pub(super) fn ripple(m: &mut Physics, mut of: Concealed) -> Concealed {
 }
 
 /// Play of 2.9°, with teeth of 2 kN m/rad. As voltage times the time it takes that is the angle times
-/// the back-emf constant at the shaft; the fitted effect has no rotor that strikes.
+/// the back-emf constant at the shaft; the fitted effect has softer teeth that part without bouncing off.
 pub(super) fn backlash(m: &mut Physics, mut of: Concealed) -> Concealed {
     let gap = Gap {
         gap: 0.05 * of.size,
@@ -110,12 +109,10 @@ pub(super) fn backlash(m: &mut Physics, mut of: Concealed) -> Concealed {
     };
     m.gap = Some(gap);
     of.approximate = true;
-    let k = m.robot.lumped();
-    let back_emf = match m.robot {
-        Driven::Twil => -k.k_a * m.body.wheel_radius / (2.0 * k.k_c),
-        Driven::Axis => -k.k_a / k.k_c,
-    };
+    let back_emf = m.robot.back_emf(m.body.wheel_radius);
+    let damping = m.motor.torque_per_volt() * back_emf;
     of.fitted("play", gap.gap * back_emf, "V s")
+        .fitted("rotor", m.motor.reflected_inertia / damping, "s")
         .physical("gap", gap.gap, "rad")
         .physical("stiffness", gap.stiffness, "N m/rad")
         .physical("damping", gap.damping, "N m s/rad")
