@@ -38,8 +38,10 @@ where
     pub(crate) fn clip(&mut self, command: &mut [S]) -> bool {
         let mut saturated = false;
         for (value, limit) in command.iter_mut().zip(self.limit.iter()) {
-            saturated |= value.abs() > *limit;
-            *value = value.held(-*limit, *limit);
+            if value.abs() > *limit {
+                *value = value.held(-*limit, *limit);
+                saturated = true;
+            }
         }
         self.last.as_mut_slice().copy_from_slice(command);
         saturated

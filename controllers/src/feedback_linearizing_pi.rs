@@ -94,7 +94,6 @@ where
     drift: OVector<S, D>,
     scale: OVector<S, D>,
     matrix: OMatrix<S, D, D>,
-    factors: OMatrix<S, D, D>,
 }
 
 /// Where the acceleration comes from.
@@ -191,7 +190,6 @@ where
             drift: zero.clone(),
             scale: zero,
             matrix: OMatrix::zeros_generic(dim, dim),
-            factors: OMatrix::zeros_generic(dim, dim),
         })
     }
 
@@ -201,6 +199,40 @@ where
         let (dim, one) = self.demand.shape_generic();
         self.forward = Some(OVector::from_element_generic(dim, one, S::of(f64::NAN)));
         self
+    }
+
+    /// The last term of `z`, for a clipped `command`: the reference that it can follow is another one.
+    #[cold]
+    fn condition(&mut self, measured: &[S], model: &mut dyn AffineModel<S>, command: &[S]) {
+        let half = self.period * S::of(0.5);
+        let achieved = &mut self.scale;
+        let felt = self.felt.as_mut_slice();
+        felt.copy_from_slice(command);
+        model.pass(self.middle.as_slice(), felt);
+        // First where the middle of the period was thought to lie; clipped, it lies elsewhere.
+        for _ in 0..2 {
+            let (drift, matrix) = (self.drift.as_mut_slice(), self.matrix.as_mut_slice());
+            model.evaluate(self.middle.as_slice(), drift, matrix);
+            accelerate(&self.drift, &self.matrix, felt, achieved);
+            for (i, middle) in self.middle.iter_mut().enumerate() {
+                *middle = measured[i] + half * achieved[i];
+            }
+        }
+        if let Law::Pi {
+            proportional,
+            integral,
+            weight,
+            z,
+        } = &mut self.law
+        {
+            for (i, achieved) in achieved.iter().enumerate() {
+                let missing = *achieved - self.demand[i];
+                let next = z[i] + integral[i] * missing / (proportional[i] * weight[i]);
+                if next.is_finite() {
+                    z[i] = next;
+                }
+            }
+        }
     }
 
     /// The acceleration asked for at the last step, one per controlled state.
@@ -228,38 +260,49 @@ where
         if sizes.iter().any(|size| *size != n) {
             return Err(ControlError::Sizes);
         }
-        // A sum is finite where all of it is.
-        let signals = reference.iter().zip(measured);
-        let sum = signals.fold(S::zero(), |sum, (r, y)| sum + *r + *y);
-        if !sum.is_finite() {
-            return Ok(self.inputs.hold(command));
-        }
         let half = self.period * S::of(0.5);
-        for i in 0..n {
-            self.demand[i] = match &self.law {
-                Law::Pi {
-                    proportional,
-                    weight,
-                    z,
-                    ..
-                } => proportional[i] * (weight[i] * reference[i] - measured[i]) + z[i],
-                Law::OpenLoop(acceleration) => acceleration[i],
-            };
-            if let Some(before) = &mut self.forward {
+        match &self.law {
+            Law::Pi {
+                proportional,
+                weight,
+                z,
+                ..
+            } => {
+                for i in 0..n {
+                    self.demand[i] =
+                        proportional[i] * (weight[i] * reference[i] - measured[i]) + z[i];
+                }
+            }
+            Law::OpenLoop(acceleration) => self.demand.copy_from(acceleration),
+        }
+        if let Some(before) = &mut self.forward {
+            for i in 0..n {
                 let rate = (reference[i] - before[i]) / self.period;
                 before[i] = reference[i];
                 if rate.is_finite() {
                     self.demand[i] += rate;
                 }
             }
-            self.middle[i] = measured[i] + half * self.demand[i];
-            self.aim[i] = match &self.law {
-                Law::Pi { .. } => reference[i],
-                // Ever further in this direction.
-                Law::OpenLoop(acceleration) => measured[i] + S::of(1e6) * acceleration[i],
-            };
         }
-        model.aim(self.aim.as_slice());
+        let mut sum = S::zero();
+        for (i, middle) in self.middle.iter_mut().enumerate() {
+            *middle = measured[i] + half * self.demand[i];
+            sum += *middle;
+        }
+        // A sum is finite where all of it is: signals that are no numbers end up here.
+        if !sum.is_finite() {
+            return Ok(self.inputs.hold(command));
+        }
+        match &self.law {
+            Law::Pi { .. } => model.aim(reference),
+            Law::OpenLoop(acceleration) => {
+                // Ever further in this direction.
+                for i in 0..n {
+                    self.aim[i] = measured[i] + S::of(1e6) * acceleration[i];
+                }
+                model.aim(self.aim.as_slice());
+            }
+        }
         // A model that writes nothing must not go unnoticed.
         self.drift.fill(S::of(f64::NAN));
         self.matrix.fill(S::of(f64::NAN));
@@ -271,9 +314,8 @@ where
         for (i, value) in command.iter_mut().enumerate() {
             *value = self.demand[i] - self.drift[i];
         }
-        self.factors.copy_from(&self.matrix);
         if solve(
-            self.factors.as_mut_slice(),
+            self.matrix.as_mut_slice(),
             command,
             self.scale.as_mut_slice(),
         )
@@ -283,40 +325,15 @@ where
         }
         let mut saturated = !model.invert(self.middle.as_slice(), command);
         saturated |= self.inputs.clip(command);
-        if let Law::Pi {
-            proportional,
-            integral,
-            weight,
-            z,
-        } = &mut self.law
-        {
-            if saturated {
-                // Clipped, the middle of the period lies elsewhere.
-                let achieved = &mut self.scale;
-                let felt = self.felt.as_mut_slice();
-                felt.copy_from_slice(command);
-                model.pass(self.middle.as_slice(), felt);
-                accelerate(&self.drift, &self.matrix, felt, achieved);
-                for i in 0..n {
-                    self.middle[i] = measured[i] + half * achieved[i];
-                }
-                model.evaluate(
-                    self.middle.as_slice(),
-                    self.drift.as_mut_slice(),
-                    self.matrix.as_mut_slice(),
-                );
-                accelerate(&self.drift, &self.matrix, felt, achieved);
-            }
+        if let Law::Pi { integral, z, .. } = &mut self.law {
             for i in 0..n {
-                // The reference that the inputs, as clipped, can follow.
-                let mut follows = reference[i];
-                if saturated {
-                    follows += (self.scale[i] - self.demand[i]) / (proportional[i] * weight[i]);
-                }
-                let next = z[i] + integral[i] * (follows - measured[i]);
+                let next = z[i] + integral[i] * (reference[i] - measured[i]);
                 if next.is_finite() {
                     z[i] = next;
                 }
+            }
+            if saturated {
+                self.condition(measured, model, command);
             }
         }
         Ok(Command {

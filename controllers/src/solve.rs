@@ -2,8 +2,8 @@
 
 use loopsight_core::Real;
 
-/// A pivot below this, after rows and columns were scaled to a largest entry of 1, is no pivot.
-const LEAST_PIVOT: f64 = 1e-6;
+/// What is left of a difference by less than this share of its terms is but rounding.
+const ROUNDING: f64 = 1e-6;
 
 /// Why there is no safe solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,17 +12,21 @@ pub enum Singular {
     Row(usize),
     /// This column is zero: the unknown appears in no equation.
     Column(usize),
-    /// Rows depend on each other; the best pivot that is left, relative to the largest entries.
-    Dependent(f64),
+    /// Rows depend on each other: less than a millionth of one is left where the others are taken from it.
+    Dependent,
     /// An entry is not a finite number.
     NotFinite,
 }
 
-/// Solves `A x = b` by Gaussian elimination with partial pivoting, rows and columns scaled first,
-/// so that the units of equations and unknowns do not matter.
+/// Solves `A x = b` by Gaussian elimination with partial pivoting, each row in units of its largest entry:
 ///
-/// `a` (row by row, `b.len()²` entries) and `scale` (as long as `b`) are overwritten; `b` becomes
-/// `x`. Matrices with a scaled pivot below 1e-6 are refused.
+/// ```text
+/// the k-th pivot is the largest |a_ik|/max_j |a_ij| of the rows that are left
+/// a_ij <- a_ij - (a_ik/a_kk) a_kj, zero where this is less than 1e-6 of its terms
+/// ```
+///
+/// So the units of equations and unknowns do not matter. `a` (row by row, `b.len()²` entries) and `scale` (as
+/// long as `b`) are overwritten; `b` becomes `x`. Matrices without a pivot are refused.
 ///
 /// Reference: Golub, Van Loan (2013), "Matrix Computations", 3.4 and 3.5.2.
 ///
@@ -37,54 +41,36 @@ pub fn solve<S: Real>(a: &mut [S], b: &mut [S], scale: &mut [S]) -> Result<(), S
     if a.len() != n * n || scale.len() != n {
         return Err(Singular::NotFinite);
     }
-    // An entry that is not finite leaves a solution that is none, or is found where there is none.
-    let because = |a: &[S], b: &[S], why| {
-        let finite = a.iter().chain(b).all(|value| value.is_finite());
-        Err(if finite { why } else { Singular::NotFinite })
-    };
-    for i in 0..n {
-        let row = &mut a[i * n..(i + 1) * n];
-        let largest = row[1..].iter().fold(row[0].abs(), |m, v| m.larger(v.abs()));
-        if largest == S::zero() {
-            return because(a, b, Singular::Row(i));
-        }
-        for value in row {
-            *value /= largest;
-        }
-        b[i] /= largest;
-    }
-    for j in 0..n {
-        let largest = (1..n).fold(a[j].abs(), |m, i| m.larger(a[i * n + j].abs()));
-        if largest == S::zero() {
-            return because(a, b, Singular::Column(j));
-        }
-        for i in 0..n {
-            a[i * n + j] /= largest;
-        }
-        scale[j] = largest;
+    for (row, scale) in a.chunks_exact(n).zip(scale.iter_mut()) {
+        *scale = row[1..].iter().fold(row[0].abs(), |m, v| m.larger(v.abs()));
     }
     for k in 0..n {
-        let mut best = k;
         for i in k + 1..n {
-            if a[i * n + k].abs() > a[best * n + k].abs() {
-                best = i;
+            if a[i * n + k].abs() * scale[k] > a[k * n + k].abs() * scale[i] {
+                for j in k..n {
+                    a.swap(k * n + j, i * n + j);
+                }
+                b.swap(k, i);
+                scale.swap(k, i);
             }
         }
-        let pivot = a[best * n + k];
-        if pivot.abs() < S::of(LEAST_PIVOT) {
-            return because(a, b, Singular::Dependent(pivot.abs().value()));
-        }
-        if best != k {
-            for j in k..n {
-                a.swap(k * n + j, best * n + j);
-            }
-            b.swap(k, best);
+        let pivot = a[k * n + k];
+        // What is no number is no pivot either.
+        let usable = pivot.abs() > S::zero();
+        if !usable {
+            return Err(why(a, b, scale));
         }
         for i in k + 1..n {
             let factor = a[i * n + k] / pivot;
             for j in k + 1..n {
-                let above = a[k * n + j];
-                a[i * n + j] -= factor * above;
+                let (whole, taken) = (a[i * n + j], factor * a[k * n + j]);
+                let left = whole - taken;
+                let rounding = S::of(ROUNDING) * (whole.abs() + taken.abs());
+                a[i * n + j] = if left.abs() <= rounding {
+                    S::zero()
+                } else {
+                    left
+                };
             }
             let above = b[k];
             b[i] -= factor * above;
@@ -97,14 +83,31 @@ pub fn solve<S: Real>(a: &mut [S], b: &mut [S], scale: &mut [S]) -> Result<(), S
         }
         b[i] = sum / a[i * n + i];
     }
-    for (value, scale) in b.iter_mut().zip(scale.iter()) {
-        *value /= *scale;
-    }
-    // A sum is finite where all of it is.
-    if b.iter().fold(S::zero(), |sum, v| sum + *v).is_finite() {
+    // A sum is finite where all of it is. An infinite entry may leave a solution that is none.
+    let sum = b
+        .iter()
+        .zip(scale.iter())
+        .fold(S::zero(), |sum, (x, s)| sum + *x + *s);
+    if sum.is_finite() {
         Ok(())
     } else {
         Err(Singular::NotFinite)
+    }
+}
+
+/// Why there is no pivot. A row that is zero was never swapped, and a column that is zero stayed so.
+#[cold]
+fn why<S: Real>(a: &[S], b: &[S], scale: &[S]) -> Singular {
+    let n = b.len();
+    let zero = |v: &S| *v == S::zero();
+    if !a.iter().chain(b).chain(scale).all(|v| v.is_finite()) {
+        Singular::NotFinite
+    } else if let Some(row) = scale.iter().position(zero) {
+        Singular::Row(row)
+    } else if let Some(column) = (0..n).find(|j| a[*j..].iter().step_by(n).all(zero)) {
+        Singular::Column(column)
+    } else {
+        Singular::Dependent
     }
 }
 
@@ -147,7 +150,7 @@ mod tests {
         let solve = |mut a: [f64; 4]| super::solve(&mut a, &mut [1.0, 2.0], &mut [0.0; 2]);
         assert_eq!(solve([1.0, 2.0, 0.0, 0.0]), Err(Singular::Row(1)));
         assert_eq!(solve([1.0, 0.0, 3.0, 0.0]), Err(Singular::Column(1)));
-        assert_eq!(solve([1.0, 2.0, 2.0, 4.0]), Err(Singular::Dependent(0.0)));
+        assert_eq!(solve([1.0, 2.0, 2.0, 4.0]), Err(Singular::Dependent));
         for (i, entry) in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY]
             .into_iter()
             .enumerate()

@@ -1,31 +1,32 @@
 //! The hyperbolic tangent in single precision.
 
-/// From here on `tanh x` rounds to 1.
-const LIMIT: f32 = 9.02;
+/// From here on `tanh x` is taken for 1; it is less by 3.4e-7 at most.
+const LIMIT: f32 = 7.8;
 
 /// Numerator, by ascending powers of `x²`.
-const P: [f32; 5] = [
-    0.999_999_98,
-    0.133_797_15,
-    3.494_030_8e-3,
-    2.058_342_3e-5,
-    1.331_899_5e-8,
-];
+const P: [f32; 4] = [0.999_999_9, 0.129_431_16, 2.969_889e-3, 1.163_571_9e-5];
 
 /// Denominator.
-const Q: [f32; 5] = [1.0, 0.467_130_3, 2.587_105_9e-2, 3.283_087e-4, 7.761_987e-7];
+const Q: [f32; 5] = [
+    1.0,
+    0.462_763_53,
+    2.389_239_7e-2,
+    2.413_546e-4,
+    2.526_236_3e-7,
+];
 
-/// `tanh x` to three units of the last digit, odd, and never beyond 1.
+/// `tanh x` to four units of the last digit, odd, and never beyond 1.
 ///
 /// ```text
-/// tanh x ≈ x P(x²)/Q(x²)        |x| ≤ 9.02, ±1 beyond
+/// tanh x ≈ x P(x²)/Q(x²)        |x| ≤ 7.8, ±1 beyond
 /// ```
 ///
-/// `P` and `Q` of degree 4 are those that make the greatest relative error least over that range: it is
-/// 2.1e-8, a third of what rounding leaves (found by Remez' exchange in 60 digits).
+/// `P` and `Q` of degrees 3 and 4 are those that make the greatest relative error least over that range: it is
+/// 1.2e-7, half of what rounding adds (found by Remez' exchange in 60 digits). The range ends where both together
+/// still stay below 1.
 ///
 /// It stands in for `tanhf` of a library because friction asks for it once per wheel and regression in every
-/// tick of a microcontroller: by way of `expm1` that is twice as many instructions as this, which is nothing
+/// tick of a microcontroller: by way of `expm1` that is more than twice as many instructions as this, which is nothing
 /// but sums, products and one quotient, and so has the same digits on every machine.
 ///
 /// Reference: E. Y. Remez (1934), "Sur le calcul effectif des polynômes d'approximation de Tchebichef",
@@ -36,9 +37,9 @@ pub(crate) fn tanhf(x: f32) -> f32 {
         return 1f32.copysign(x);
     }
     let t = x * x;
-    let at = |c: &[f32; 5]| (((c[4] * t + c[3]) * t + c[2]) * t + c[1]) * t + c[0];
-    let y = x * at(&P) / at(&Q);
-    if y.abs() > 1.0 { 1f32.copysign(y) } else { y }
+    let above = ((P[3] * t + P[2]) * t + P[1]) * t + P[0];
+    let below = (((Q[4] * t + Q[3]) * t + Q[2]) * t + Q[1]) * t + Q[0];
+    x * above / below
 }
 
 #[cfg(test)]
@@ -61,7 +62,11 @@ mod tests {
             }
         }
         println!("worst relative error {worst:.2e}");
-        assert!(worst < 3.0 * f64::from(f32::EPSILON));
+        assert!(worst < 4.0 * f64::from(f32::EPSILON));
+        // Every one of those that come near 1.
+        for bits in 4f32.to_bits()..=LIMIT.to_bits() {
+            assert!(tanhf(f32::from_bits(bits)) <= 1.0);
+        }
         assert!(tanhf(f32::NAN).is_nan());
         assert_eq!(tanhf(f32::INFINITY), 1.0);
     }

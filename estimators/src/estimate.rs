@@ -13,7 +13,6 @@ where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
     theta: OVector<S, D>,
-    next: OVector<S, D>,
     pub(crate) factor: Factor<S, D>,
     initial: S,
     /// Greatest diagonal entry of `P`, less what rounding may add to it.
@@ -29,7 +28,6 @@ where
         let (dim, _) = theta.shape_generic();
         let factor = Factor::new(dim);
         let mut estimate = Self {
-            next: theta.clone(),
             cap: factor.shown_below(S::of(limit)),
             factor,
             initial: S::of(initial),
@@ -54,17 +52,20 @@ where
         self.factor.bound(self.cap);
     }
 
-    /// `θ <- θ + P φ step`, for the `φ` of [`Factor::spread`]; false, and nothing moved, where that
-    /// leaves the finite numbers.
-    pub(crate) fn advance(&mut self, step: S) -> bool {
-        for (i, next) in self.next.iter_mut().enumerate() {
-            *next = self.theta[i] + self.factor.gain(i) * step;
-        }
+    /// `θ <- θ + P φ e/(noise + spread)`, for the `φ` of [`Factor::spread`] and what that returned; false, and
+    /// nothing moved, where any of these is no finite number.
+    pub(crate) fn advance(&mut self, innovation: S, noise: S, spread: S) -> bool {
+        let step = innovation / (noise + spread);
         // A sum is finite where all of it is; one that is too large is refused as well.
-        let sum = self.next.iter().fold(S::zero(), |sum, v| sum + *v);
+        let mut sum = spread;
+        for (i, theta) in self.theta.iter().enumerate() {
+            sum += *theta + self.factor.gain(i) * step;
+        }
         let finite = sum.is_finite();
         if finite {
-            self.theta.copy_from(&self.next);
+            for (i, theta) in self.theta.iter_mut().enumerate() {
+                *theta += self.factor.gain(i) * step;
+            }
         }
         finite
     }

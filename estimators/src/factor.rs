@@ -6,14 +6,14 @@ use loopsight_core::Real;
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector, U1};
 
-/// No entry of `D` falls below this.
+/// Added to each entry of `D` in each measurement: none becomes zero.
 pub(crate) const LEAST: f64 = 1e-30;
 
 /// A covariance as `U D Uᵀ` (`U` unit upper triangular, `D` diagonal).
 ///
 /// Each entry of `D` is multiplied by positive numbers, or has positive ones added, so that `P` cannot
-/// become indefinite however many updates there are, in `f32` as in `f64` (an entry of `D` that would
-/// underflow is held at 1e-30).
+/// become indefinite however many updates there are, in `f32` as in `f64` (1e-30 keeps an entry of `D` from
+/// underflow).
 ///
 /// Reference: G. J. Bierman (1977), "Factorization Methods for Discrete Sequential Estimation", ch. V
 /// (a measurement) and appendix III.C (Agee's and Turner's rank-one sum).
@@ -25,8 +25,9 @@ where
     /// Strictly upper triangle of `U`; the rest is not used.
     u: OMatrix<S, D, D>,
     d: OVector<S, D>,
-    /// `Uᵀφ`, `D Uᵀφ` and scratch.
-    work: [OVector<S, D>; 3],
+    /// `Uᵀφ`.
+    seen: OVector<S, D>,
+    scratch: OVector<S, D>,
     /// `1 + 4 n²` rounding units.
     enlargement: S,
 }
@@ -41,7 +42,8 @@ where
         Self {
             u: OMatrix::zeros_generic(dim, dim),
             d: zero.clone(),
-            work: [zero.clone(), zero.clone(), zero],
+            seen: zero.clone(),
+            scratch: zero,
             enlargement: S::one() + S::of(4.0) * n * n * rounding_unit(),
         }
     }
@@ -59,8 +61,7 @@ where
 
     /// Prepares for the regressor `phi`, and returns `φᵀPφ`.
     pub(crate) fn spread(&mut self, phi: &[S]) -> S {
-        let [f, v, _] = &mut self.work;
-        let (f, v) = (f.as_mut_slice(), v.as_mut_slice());
+        let f = self.seen.as_mut_slice();
         let (u, d) = (self.u.as_slice(), self.d.as_slice());
         let n = d.len();
         let mut spread = S::zero();
@@ -70,19 +71,18 @@ where
                 sum += u[j * n + i] * phi[i];
             }
             f[j] = sum;
-            v[j] = d[j] * sum;
-            spread += v[j] * sum;
+            spread += d[j] * sum * sum;
         }
         spread
     }
 
     /// The `i`-th entry of `P φ`, for the `φ` of [`Factor::spread`].
     pub(crate) fn gain(&self, i: usize) -> S {
-        let (u, v) = (self.u.as_slice(), self.work[1].as_slice());
-        let n = v.len();
-        let mut sum = v[i];
+        let (u, d, f) = (self.u.as_slice(), self.d.as_slice(), self.seen.as_slice());
+        let n = d.len();
+        let mut sum = d[i] * f[i];
         for j in i + 1..n {
-            sum += u[j * n + i] * v[j];
+            sum += u[j * n + i] * (d[j] * f[j]);
         }
         sum
     }
@@ -90,31 +90,30 @@ where
     /// Takes in a measurement of `φᵀθ`, prepared by [`Factor::spread`], whose noise has the variance
     /// `noise`, and multiplies `P` by `growth`.
     pub(crate) fn absorb(&mut self, noise: S, growth: S) {
-        let [f, v, b] = &mut self.work;
-        let (f, v, b) = (f.as_slice(), v.as_slice(), b.as_mut_slice());
+        let (f, b) = (self.seen.as_slice(), self.scratch.as_mut_slice());
         let (u, d) = (self.u.as_mut_slice(), self.d.as_mut_slice());
         let n = d.len();
         let least = S::of(LEAST);
         let mut alpha = noise;
         let mut inverse = S::one() / alpha;
         for j in 0..n {
-            let p = f[j] * inverse;
+            let (p, v) = (f[j] * inverse, d[j] * f[j]);
             let before = alpha;
-            alpha += v[j] * f[j];
+            alpha += v * f[j];
             inverse = S::one() / alpha;
-            d[j] = (d[j] * (before * inverse) * growth).larger(least);
+            d[j] = least + d[j] * (before * inverse) * growth;
             for i in 0..j {
                 let old = u[j * n + i];
                 u[j * n + i] = old - b[i] * p;
-                b[i] += old * v[j];
+                b[i] += old * v;
             }
-            b[j] = v[j];
+            b[j] = v;
         }
     }
 
     /// `φᵀP⁻¹φ`: what is known along `phi`.
     pub(crate) fn known(&mut self, phi: &[S]) -> S {
-        let x = self.work[2].as_mut_slice();
+        let x = self.scratch.as_mut_slice();
         let (u, d) = (self.u.as_slice(), self.d.as_slice());
         let n = d.len();
         x.copy_from_slice(phi);
@@ -130,7 +129,7 @@ where
 
     /// `P ← P + weight x xᵀ`, `weight` not below 0.
     pub(crate) fn add(&mut self, weight: S, x: impl Fn(usize) -> S) {
-        let work = self.work[2].as_mut_slice();
+        let work = self.scratch.as_mut_slice();
         let (u, d) = (self.u.as_mut_slice(), self.d.as_mut_slice());
         let n = d.len();
         for (i, to) in work.iter_mut().enumerate() {
@@ -180,14 +179,12 @@ where
         for i in 0..n {
             let variance = self.variance(i);
             if variance > cap {
-                let [f, v, _] = &mut self.work;
                 for j in 0..n {
-                    f[j] = match j.cmp(&i) {
+                    self.seen[j] = match j.cmp(&i) {
                         Ordering::Less => S::zero(),
                         Ordering::Equal => S::one(),
                         Ordering::Greater => self.u[(i, j)],
                     };
-                    v[j] = self.d[j] * f[j];
                 }
                 self.absorb(cap * (variance / (variance - cap)), S::one());
             }

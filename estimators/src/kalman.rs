@@ -110,7 +110,7 @@ where
             estimate.bound();
             spread = estimate.factor.spread(regressor);
         }
-        if !(spread.is_finite() && estimate.advance(innovation / (S::one() + spread))) {
+        if !estimate.advance(innovation, S::one(), spread) {
             return Innovation::refused();
         }
         estimate.factor.absorb(S::one(), S::one());

@@ -55,7 +55,7 @@ pub use settings::{Forgetting, RlsError, RlsSettings};
 /// **Round-off.** `P` is kept as `U D Uᵀ` (`U` unit upper triangular, `D` diagonal). Each entry of
 /// `D` is multiplied by positive numbers, or has positive ones added, so `P` cannot become indefinite
 /// however many updates there are, in `f32` as in `f64`, where the textbook difference `P - K φᵀP`
-/// does (an entry of `D` that would underflow is held at 1e-30). The matrix that
+/// does (1e-30 keeps an entry of `D` from underflow). The matrix that
 /// [`Estimator::covariance`] shows is rounded once more; its diagonal is enlarged by `4 n²` rounding
 /// units, more than those roundings and a Cholesky factorisation can take away (Higham 2002, theorem
 /// 10.7), so that it, too, is positive definite, and exactly symmetric.
@@ -112,6 +112,47 @@ where
         })
     }
 
+    /// Takes in the sample whose `φᵀPφ` was `predicted`, and is `spread` now, with the forgetting `lambda`.
+    #[inline(always)]
+    fn take(&mut self, innovation: S, predicted: S, lambda: S, spread: S) -> Innovation<S> {
+        if !self.estimate.advance(innovation, lambda, spread) {
+            return Innovation::refused();
+        }
+        self.estimate.factor.absorb(lambda, S::one() / lambda);
+        self.estimate.bound();
+        Innovation {
+            innovation,
+            relative_variance: S::one() + predicted,
+            accepted: true,
+        }
+    }
+
+    /// The same by a rule that looks at the sample before it forgets.
+    #[cold]
+    fn take_by(
+        &mut self,
+        rule: Forgetting,
+        regressor: &[S],
+        innovation: S,
+        predicted: S,
+    ) -> Innovation<S> {
+        // NaN and infinity anywhere in the sample end up in one of these two.
+        if !(innovation.is_finite() && predicted.is_finite()) {
+            return Innovation::refused();
+        }
+        let (lambda, spread) = match rule {
+            Forgetting::Constant => (self.memory.constant(), predicted),
+            Forgetting::Variable => {
+                let square = innovation * innovation / (S::one() + predicted);
+                let lambda = self.memory.variable(square);
+                self.memory.remember(square);
+                (lambda, predicted)
+            }
+            Forgetting::Directional => (S::one(), self.forget_along(regressor, predicted)),
+        };
+        self.take(innovation, predicted, lambda, spread)
+    }
+
     /// Forgets along `regressor`, and returns `φᵀPφ` after that.
     fn forget_along(&mut self, regressor: &[S], spread: S) -> S {
         let lambda = self.memory.constant();
@@ -142,30 +183,11 @@ where
             return Innovation::refused();
         }
         let predicted = self.estimate.factor.spread(regressor);
-        // NaN and infinity anywhere in the sample end up in one of these two.
-        if !(innovation.is_finite() && predicted.is_finite()) {
-            return Innovation::refused();
-        }
-        let square = innovation * innovation / (S::one() + predicted);
-        let (lambda, spread) = match self.rule {
-            Forgetting::Constant => (self.memory.constant(), predicted),
-            Forgetting::Variable => (self.memory.variable(square), predicted),
-            Forgetting::Directional => (S::one(), self.forget_along(regressor, predicted)),
-        };
-        if !self.estimate.advance(innovation / (lambda + spread)) {
-            return Innovation::refused();
-        }
-        self.estimate.factor.absorb(lambda, S::one() / lambda);
-        if lambda < S::one() {
-            self.estimate.bound();
-        }
-        if self.rule == Forgetting::Variable {
-            self.memory.remember(square);
-        }
-        Innovation {
-            innovation,
-            relative_variance: S::one() + predicted,
-            accepted: true,
+        match self.rule {
+            Forgetting::Constant => {
+                self.take(innovation, predicted, self.memory.constant(), predicted)
+            }
+            rule => self.take_by(rule, regressor, innovation, predicted),
         }
     }
 

@@ -1,6 +1,7 @@
 //! The effects that a robot can compensate, by their identifiers.
 
-use loopsight_core::{Effect, EffectMeta, Physics, Reading, Real};
+use loopsight_core::{Effect, EffectMeta, NoPast, Physics, Reading, Real, Role};
+use loopsight_link::PARAMETERS;
 use loopsight_plants::effects::{
     ConstantForce, CoulombFriction, DirectionalFriction, QuadraticDrag, ScrubFriction,
     StribeckFriction, ViscousFriction,
@@ -31,11 +32,35 @@ macro_rules! aboard {
                 }
             }
 
-            /// What it adds to its channel with the parameters `p`, in the channel's unit.
-            #[inline]
-            pub fn contribution<S: Real>(self, at: &Reading<'_, S>, p: &[S]) -> S {
+            /// What it adds to its channel with the parameters `p`, in the channel's unit. `nominal` and
+            /// `side` are those of a [`Reading`], `signal` is what it reads there, in its order.
+            #[inline(always)]
+            pub(crate) fn contribution<S: Real>(
+                self,
+                nominal: S,
+                side: S,
+                signal: impl Fn(usize) -> S,
+                p: &[S; PARAMETERS],
+            ) -> S {
                 match self {
-                    $(Known::$effect => Physics::contribution(&$effect, at, &[], p),)+
+                    $(Known::$effect => {
+                        let mut reading = Reading {
+                            time: 0.0,
+                            from: 0.0,
+                            to: 0.0,
+                            nominal,
+                            side,
+                            is_position: false,
+                            roles: [S::zero(); Role::COUNT],
+                            signals: &[],
+                            past: &NoPast,
+                        };
+                        for (k, role) in $effect::META.reads.iter().enumerate() {
+                            reading.roles[*role as usize] = signal(k);
+                        }
+                        let p = &p[..$effect::META.parameters.len()];
+                        Physics::contribution(&$effect, &reading, &[], p)
+                    })+
                 }
             }
         }
@@ -51,6 +76,19 @@ aboard!(
     StribeckFriction,
     ViscousFriction
 );
+
+/// Most signals that one of them reads at a channel.
+pub(crate) const READS: usize = {
+    let (mut most, mut k) = (0, 0);
+    while k < Known::ALL.len() {
+        let reads = Known::ALL[k].meta().reads.len();
+        if reads > most {
+            most = reads;
+        }
+        k += 1;
+    }
+    most
+};
 
 impl Known {
     /// The effect `id`, where it is known aboard.

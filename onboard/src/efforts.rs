@@ -1,73 +1,57 @@
 //! What the effects of a model add to the efforts of its plant.
 
 use heapless::Vec;
-use loopsight_core::{NoPast, Place, Plant, Reading, Real, Role};
+use loopsight_core::{Place, Plant, Real};
 use loopsight_link::{Attachment, CHANNELS, EFFECTS, PARAMETERS, Unusable};
 
 use crate::Known;
-
-/// Most roles that an effect reads at a channel.
-const ROLES: usize = 4;
+use crate::effects::READS;
 
 /// The effects of a model on the efforts of a plant.
 ///
 /// ```text
 /// w[c] = Σ over the effects on channel c, each with the sum of those before it as its nominal
+/// s = c y                                                   a signal that an effect reads
 /// ```
 ///
 /// The same order, and the same source of every effect, as in a simulation on a host.
+///
+/// | symbol | what |
+/// |---|---|
+/// | `y` | controlled states, `NU` of them |
+/// | `s` | a signal: one of the controlled states, or an output that is linear in them, as speeds are |
+/// | `c` | how, found by moving each of the states by one; what is learned does not move it |
 #[derive(Clone)]
-pub struct Efforts<S: 'static, const NX: usize> {
-    effects: Vec<Acting<S>, EFFECTS>,
-    /// Which state of the plant is the `i`-th controlled one.
-    controlled: &'static [usize],
+pub struct Efforts<S, const NU: usize> {
+    acting: Vec<Acting<S, NU>, { EFFECTS * CHANNELS }>,
 }
 
-/// One effect, at all its channels.
+/// An effect at one of its channels.
 #[derive(Clone)]
-struct Acting<S: 'static> {
+pub(crate) struct Acting<S, const NU: usize> {
     known: Known,
-    values: Vec<S, PARAMETERS>,
-    channels: Vec<At<S>, CHANNELS>,
-    /// What it sees at the present channel; roles that it does not read are never written.
-    reading: Reading<'static, S>,
-}
-
-/// A channel that an effect is at.
-#[derive(Clone)]
-struct At<S> {
     effort: usize,
     side: S,
-    /// Roles and where their signals are: states first, then outputs (inputs are not offered).
-    reads: Vec<(Role, Where), ROLES>,
+    /// `c` of the signals that it reads there, in its order.
+    reads: [[S; NU]; READS],
+    values: [S; PARAMETERS],
 }
 
-#[derive(Clone, Copy)]
-enum Where {
-    State(usize),
-    Output(usize),
-}
-
-impl<S: Real, const NX: usize> Efforts<S, NX> {
+impl<S: Real, const NU: usize> Efforts<S, NU> {
     /// No effects.
-    pub fn none<P, const NU: usize, const NW: usize, const NP: usize, const NY: usize>() -> Self
-    where
-        P: Plant<NX, NU, NW, NP, NY>,
-    {
-        Self {
-            effects: Vec::new(),
-            controlled: P::META.controlled,
-        }
+    pub fn none() -> Self {
+        Self { acting: Vec::new() }
     }
 
-    /// The effects of a configuration, for the plant `P`.
-    pub fn new<P, const NU: usize, const NW: usize, const NP: usize, const NY: usize>(
+    /// The effects of a configuration, for the plant `P` with the parameters `p`.
+    pub fn new<P, const NX: usize, const NW: usize, const NP: usize, const NY: usize>(
         attachments: &[Attachment],
+        p: &[S; NP],
     ) -> Result<Self, Unusable>
     where
         P: Plant<NX, NU, NW, NP, NY>,
     {
-        let mut efforts = Self::none::<P, NU, NW, NP, NY>();
+        let mut efforts = Self::none();
         for (index, attachment) in attachments.iter().enumerate() {
             let at = index as u8;
             let known = Known::named(&attachment.id).ok_or(Unusable::Effect(at))?;
@@ -76,91 +60,65 @@ impl<S: Real, const NX: usize> Efforts<S, NX> {
             if meta.parameters.len() != attachment.values.len() || !finite {
                 return Err(Unusable::Effect(at));
             }
-            let values = attachment.values.iter().map(|v| S::of(f64::from(*v)));
-            let mut acting = Acting {
-                known,
-                values: values.collect(),
-                channels: Vec::new(),
-                reading: Reading {
-                    time: 0.0,
-                    from: 0.0,
-                    to: 0.0,
-                    nominal: S::zero(),
-                    side: S::zero(),
-                    is_position: false,
-                    roles: [S::zero(); Role::COUNT],
-                    signals: &[],
-                    past: &NoPast,
-                },
-            };
+            let mut values = [S::zero(); PARAMETERS];
+            for (to, from) in values.iter_mut().zip(&attachment.values) {
+                *to = S::of(f64::from(*from));
+            }
             for channel in &attachment.channels {
                 let channel =
                     (P::META.channels.get(usize::from(*channel))).ok_or(Unusable::Channel(at))?;
                 let Place::Effort(effort) = channel.place else {
                     return Err(Unusable::Channel(at));
                 };
-                let mut reads = Vec::new();
-                for role in meta.reads {
+                let mut reads = [[S::zero(); NU]; READS];
+                for (to, role) in reads.iter_mut().zip(meta.reads) {
                     let name = channel.read(*role).ok_or(Unusable::Channel(at))?;
-                    let place = find::<P, NX, NU, NW, NP, NY>(name).ok_or(Unusable::Reads(at))?;
-                    reads
-                        .push((*role, place))
-                        .map_err(|_| Unusable::Reads(at))?;
+                    *to = signal::<S, P, NX, NU, NW, NP, NY>(name, p).ok_or(Unusable::Reads(at))?;
                 }
-                let side = S::of(f64::from(channel.side));
-                let place = At {
+                let acting = Acting {
+                    known,
                     effort,
-                    side,
+                    side: S::of(f64::from(channel.side)),
                     reads,
+                    values,
                 };
                 let full = |_| Unusable::Effect(at);
-                acting.channels.push(place).map_err(full)?;
+                efforts.acting.push(acting).map_err(full)?;
             }
-            let full = |_| Unusable::Effect(at);
-            efforts.effects.push(acting).map_err(full)?;
         }
         Ok(efforts)
     }
 
     /// The efforts where the controlled states are `y`.
     #[inline(always)]
-    pub fn at<P, const NU: usize, const NW: usize, const NP: usize, const NY: usize>(
-        &mut self,
-        y: &[S; NU],
-        p: &[S; NP],
-    ) -> [S; NW]
-    where
-        P: Plant<NX, NU, NW, NP, NY>,
-    {
+    pub fn at<const NW: usize>(&self, y: &[S; NU]) -> [S; NW] {
         let mut w = [S::zero(); NW];
-        if self.effects.is_empty() {
-            return w;
-        }
-        let mut x = [S::zero(); NX];
-        for (state, value) in self.controlled.iter().zip(y) {
-            x[*state] = *value;
-        }
-        for acting in &mut self.effects {
-            let reading = &mut acting.reading;
-            for at in &acting.channels {
-                for (role, place) in &at.reads {
-                    reading.roles[*role as usize] = match *place {
-                        Where::State(i) => x[i],
-                        Where::Output(i) => output::<S, P, NX, NU, NW, NP, NY>(i, &x, p),
-                    };
-                }
-                let effort = &mut w[at.effort];
-                (reading.nominal, reading.side) = (*effort, at.side);
-                *effort += acting.known.contribution(reading, &acting.values);
-            }
+        for acting in &self.acting {
+            let effort = &mut w[acting.effort];
+            *effort += acting.contribution(*effort, y);
         }
         w
     }
 }
 
-/// An output that reads no inputs. Not inlined: a compiler would work out all of them.
-#[inline(never)]
-fn output<
+impl<S: Real, const NU: usize> Acting<S, NU> {
+    /// What it adds to an effort that is `nominal` without it. On its own: within a tick its constants would
+    /// be loaded, and what they displace saved, before it is known which effect it is.
+    #[inline(never)]
+    fn contribution(&self, nominal: S, y: &[S; NU]) -> S {
+        let signal = |k: usize| {
+            let products = self.reads[k].iter().zip(y).map(|(c, y)| *c * *y);
+            products
+                .reduce(|sum, product| sum + product)
+                .unwrap_or(S::zero())
+        };
+        (self.known).contribution(nominal, self.side, signal, &self.values)
+    }
+}
+
+/// `c` of the signal `name`, where it is linear in the controlled states alone: everything else is not known
+/// aboard. Found by moving them and the rest, in the plant's own equations.
+fn signal<
     S,
     P,
     const NX: usize,
@@ -169,34 +127,43 @@ fn output<
     const NP: usize,
     const NY: usize,
 >(
-    index: usize,
-    x: &[S; NX],
+    name: &str,
     p: &[S; NP],
-) -> S
+) -> Option<[S; NU]>
 where
     S: Real,
     P: Plant<NX, NU, NW, NP, NY>,
 {
-    P::output(index, x, &[S::zero(); NU], p)
-}
-
-/// The signal `name`, where it follows from the controlled states alone: everything else is not known
-/// aboard. Found by moving the rest.
-fn find<P, const NX: usize, const NU: usize, const NW: usize, const NP: usize, const NY: usize>(
-    name: &str,
-) -> Option<Where>
-where
-    P: Plant<NX, NU, NW, NP, NY>,
-{
     let controlled = P::META.controlled;
-    if let Some(i) = P::META.states.iter().position(|s| s.id == name) {
-        return controlled.contains(&i).then_some(Where::State(i));
+    let unit = |i: usize| core::array::from_fn(|k| if k == i { S::one() } else { S::zero() });
+    if let Some(state) = P::META.states.iter().position(|s| s.id == name) {
+        return controlled.iter().position(|i| *i == state).map(unit);
     }
-    let i = P::META.outputs.iter().position(|s| s.id == name)?;
-    let p: [f64; NP] = core::array::from_fn(|j| 0.7 + 0.1 * j as f64);
-    let at = |rest: f64| {
-        let x = core::array::from_fn(|j| if controlled.contains(&j) { 0.3 } else { rest });
-        P::output(i, &x, &[rest; NU], &p)
+    let index = P::META.outputs.iter().position(|s| s.id == name)?;
+    let output = |y: &[S; NU], rest: f64, p: &[S; NP]| {
+        let mut x = [S::of(rest); NX];
+        for (i, y) in controlled.iter().zip(y) {
+            x[*i] = *y;
+        }
+        P::output(index, &x, &[S::of(rest); NU], p)
     };
-    (at(0.0) == at(1.0) && at(0.0) == at(-0.6)).then_some(Where::Output(i))
+    let of = |p: &[S; NP]| core::array::from_fn(|i| output(&unit(i), 0.0, p));
+    let c: [S; NU] = of(p);
+    let mut others = *p;
+    for (value, parameter) in others.iter_mut().zip(P::META.parameters) {
+        if parameter.linear {
+            *value = *value * S::of(1.7) + S::one();
+        }
+    }
+    let linear = [[0.3, -1.1], [-2.3, 0.7], [0.0, 0.0]].iter().all(|pair| {
+        let y: [S; NU] = core::array::from_fn(|i| S::of(pair[i % 2] * (1 + i / 2) as f64));
+        let products = || c.iter().zip(&y).map(|(c, y)| *c * *y);
+        let sum = products().fold(S::zero(), |sum, product| sum + product);
+        let size = products().fold(S::zero(), |sum, product| sum + product.abs());
+        [0.0, 1.0, -0.6].iter().all(|rest| {
+            let off = (output(&y, *rest, p) - sum).abs();
+            off <= S::of(1e-5) * size
+        })
+    });
+    (linear && of(&others) == c).then_some(c)
 }

@@ -23,7 +23,7 @@ use crate::Efforts;
 /// |---|---|---|
 /// | `y` | controlled states, as measured | unit of the state |
 /// | `u` | inputs applied in the period; where `y` are means over it, the mean of two periods | of the inputs |
-/// | `w` | efforts of the effects ([`Efforts`]), at the present estimates | of the channels |
+/// | `w` | efforts of the effects ([`Efforts`]) | of the channels |
 /// | `e_j` | 1 at the `j`-th parameter | |
 /// | `T` | period | s |
 ///
@@ -53,7 +53,7 @@ pub struct Learner<
     /// The same with the `k`-th parameter of every row at one: no parameter moves the rate of another row
     /// than its own, so one of each is tried at a time.
     probes: [[S; NP]; R],
-    efforts: Efforts<S, NX>,
+    efforts: Efforts<S, NU>,
     rate: S,
     means: bool,
     certainty_equivalence: bool,
@@ -113,7 +113,7 @@ where
     pub fn new(
         settings: &Learning,
         values: [S; NP],
-        efforts: Efforts<S, NX>,
+        efforts: Efforts<S, NU>,
         means: bool,
         period: f64,
     ) -> Result<Self, Unusable> {
@@ -196,7 +196,7 @@ where
     fn learn(&mut self, before: &[S; NU], now: &[S; NU], u: &[S; NU], why: Option<Withheld>) {
         let half = S::of(0.5);
         let middle: [S; NU] = core::array::from_fn(|i| half * (before[i] + now[i]));
-        let w = self.efforts.at::<P, NU, NW, NP, NY>(&middle, &self.values);
+        let w = self.efforts.at(&middle);
         let rate = |p: &[S; NP]| rates::<S, P, NX, NU, NW, NP, NY>(&middle, u, &w, p);
         let zero = rate(&self.base);
         let moved: [[S; NU]; R] = core::array::from_fn(|k| rate(&self.probes[k]));

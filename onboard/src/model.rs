@@ -28,7 +28,7 @@ pub struct Model<
 > {
     /// Parameters of the plant.
     pub parameters: [S; NP],
-    efforts: Efforts<S, NX>,
+    efforts: Efforts<S, NU>,
     bands: [S; NU],
     aim: [S; NU],
     plant: core::marker::PhantomData<P>,
@@ -42,7 +42,7 @@ where
 {
     /// The plant with these parameters and effects; `bands` is how far from rest each controlled state
     /// has a direction.
-    pub fn new(parameters: [S; NP], efforts: Efforts<S, NX>, bands: [S; NU]) -> Self {
+    pub fn new(parameters: [S; NP], efforts: Efforts<S, NU>, bands: [S; NU]) -> Self {
         Self {
             parameters,
             efforts,
@@ -63,16 +63,21 @@ where
         NU
     }
 
+    #[inline(always)]
     fn evaluate(&mut self, y: &[S], drift: &mut [S], input_matrix: &mut [S]) {
         let Ok(y) = <&[S; NU]>::try_from(y) else {
             return;
         };
         let towards = core::array::from_fn(|i| {
             let (band, way) = (self.bands[i], self.aim[i] - y[i]);
-            y[i] + way.held(-band, band)
+            if way.abs() > band {
+                y[i] + way.held(-band, band)
+            } else {
+                self.aim[i]
+            }
         });
         let p = &self.parameters;
-        let w = self.efforts.at::<P, NU, NW, NP, NY>(&towards, p);
+        let w = self.efforts.at(&towards);
         let (f, push, g) = (P::drift(y, p), P::push(y, &w, p), P::input_matrix(y, p));
         for (to, (f, push)) in drift.iter_mut().zip(f.iter().zip(push)) {
             *to = *f + push;
@@ -85,8 +90,8 @@ where
     }
 
     fn aim(&mut self, wanted: &[S]) {
-        for (to, from) in self.aim.iter_mut().zip(wanted) {
-            *to = *from;
+        if wanted.len() == NU {
+            self.aim = core::array::from_fn(|i| wanted[i]);
         }
     }
 

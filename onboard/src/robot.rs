@@ -193,7 +193,7 @@ where
         .ok()
         .filter(|b| b.iter().all(|v| v.is_finite() && *v >= 0.0))
         .ok_or(Unusable::Controller)?;
-    let efforts = Efforts::new::<P, NU, NW, NP, NY>(&configuration.effects)?;
+    let efforts = Efforts::new::<P, NX, NW, NP, NY>(&configuration.effects, &parameters)?;
     let learner = (configuration.learning.as_ref())
         .map(|learning| {
             Learner::new(

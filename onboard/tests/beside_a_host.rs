@@ -62,8 +62,8 @@ fn attachments() -> [Attachment; 2] {
     ]
 }
 
-fn efforts() -> Efforts<f64, 6> {
-    Efforts::new::<Ddmr, 2, 4, 8, 12>(&attachments()).unwrap()
+fn efforts() -> Efforts<f64, 2> {
+    Efforts::new::<Ddmr, 6, 4, 8, 12>(&attachments(), &TRUE).unwrap()
 }
 
 /// Places and aims without symmetry, at rest and near it, too.
@@ -186,7 +186,7 @@ fn what_cannot_be_compensated_is_refused() {
             channels: list(channels),
             values: list(values),
         };
-        Efforts::<f32, 6>::new::<Ddmr, 2, 4, 8, 12>(&[attachment]).err()
+        Efforts::<f32, 2>::new::<Ddmr, 6, 4, 8, 12>(&[attachment], &BELIEVED).err()
     };
     assert_eq!(refused("coulomb_friction", &[0], &[0.9, 0.1]), None);
     assert_eq!(refused("scrub_friction", &[3], &[0.9, 0.1]), None);

@@ -132,13 +132,21 @@ fn what_the_parts_cost() {
     let lines: Vec<String> = lines.take_while(|line| line != "end").collect();
     board.kill().unwrap();
     board.wait().unwrap();
-    assert_eq!(lines.len(), 3, "{lines:?}");
-    for line in lines {
-        let (name, cost) = line.split_once(": ").unwrap();
-        let (counts, samples) = cost.split_once(" in ").unwrap();
-        let [counts, samples]: [f64; 2] = [counts, samples].map(|n| n.parse().unwrap());
-        let mean = counts / samples * INSTRUCTIONS_PER_COUNT;
-        assert!(mean > 0.0, "{line}");
-        println!("instructions, {name}: {mean:.0}");
-    }
+    let costs: Vec<f64> = (lines.iter())
+        .map(|line| {
+            let (name, cost) = line.split_once(": ").unwrap();
+            let (counts, samples) = cost.split_once(" in ").unwrap();
+            let [counts, samples]: [f64; 2] = [counts, samples].map(|n| n.parse().unwrap());
+            let mean = counts / samples * INSTRUCTIONS_PER_COUNT;
+            assert!(mean > 0.0, "{line}");
+            println!("instructions, {name}: {mean:.0}");
+            mean
+        })
+        .collect();
+    let [learning, _, control] = costs[..] else {
+        panic!("{lines:?}")
+    };
+    let list = learning + control;
+    println!("instructions, the bare list: {list:.0}");
+    assert!(list <= 600.0, "{list}");
 }

@@ -35,10 +35,12 @@ type Control = FeedbackLinearizingPi<f32, Const<2>>;
 
 /// Two updates of recursive least squares.
 #[inline(never)]
-fn learn(pair: &mut Pair, regressors: &[[f32; 3]; 2], y: &[f32; 2]) {
-    for (rls, (phi, y)) in pair.iter_mut().zip(regressors.iter().zip(y)) {
-        black_box(rls.update(phi, *y));
+fn learn(pair: &mut Pair, regressors: &[[f32; 3]; 2], y: &[f32; 2]) -> [f32; 2] {
+    let mut innovations = [0.0; 2];
+    for (i, innovation) in innovations.iter_mut().enumerate() {
+        *innovation = pair[i].update(&regressors[i], y[i]).innovation;
     }
+    innovations
 }
 
 /// Linearisation, two PI laws and limits.
@@ -94,7 +96,7 @@ fn run(line: &mut mps2::Line, watch: &mut impl Meter) -> Option<()> {
             products.fold(0.01 * random.next(), |sum, (phi, k)| sum + phi * k)
         });
         watch.start();
-        learn(&mut pair, &regressors, &y);
+        black_box(learn(&mut pair, &regressors, &y));
         counts += watch.stop();
     }
     said(line, "two recursive least squares", counts);
@@ -107,7 +109,7 @@ fn run(line: &mut mps2::Line, watch: &mut impl Meter) -> Option<()> {
         ("linearisation, two PI laws, limits", &[][..]),
         ("the same, friction compensated", &[friction]),
     ] {
-        let efforts = Efforts::new::<Ddmr, 2, 4, 8, 12>(effects).ok()?;
+        let efforts = Efforts::new::<Ddmr, 6, 4, 8, 12>(effects, &PARAMETERS).ok()?;
         let mut model: Model<f32, Ddmr, 6, 2, 4, 8, 12> =
             Model::new(PARAMETERS, efforts, [0.04, 0.3]);
         let gains = |value: f64| SVector::from([value; 2]);
