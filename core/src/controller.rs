@@ -63,6 +63,12 @@ pub trait AffineModel<S: Real> {
     fn learn(&mut self, parameter: usize, value: S) {
         let _ = (parameter, value);
     }
+    /// The same for the values of all parameters, from the first one on.
+    fn learn_all(&mut self, values: &[S]) {
+        for (parameter, value) in values.iter().enumerate() {
+            self.learn(parameter, *value);
+        }
+    }
     /// Says where the controlled states are wanted: what depends on the direction of a motion that
     /// has hardly begun (dry friction) is taken in that direction, until the next call.
     fn aim(&mut self, wanted: &[S]) {

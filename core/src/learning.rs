@@ -248,6 +248,7 @@ where
 
     /// Takes one regressor and its measurement, unless the sample is `withheld` for a reason of the
     /// loop's. Allocates nothing.
+    #[inline(never)]
     pub fn update(
         &mut self,
         regressor: &[S],
@@ -290,7 +291,8 @@ where
             lesson.withheld = Some(Withheld::DeadZone);
             return lesson;
         }
-        let beyond = innovation - innovation.held(-zone, zone);
+        let side = if innovation < S::zero() { -zone } else { zone };
+        let beyond = innovation - side;
         let hidden = self.information.hides();
         if hidden {
             before.as_mut_slice().copy_from_slice(theta);

@@ -90,8 +90,8 @@ where
 {
     let (f, push, g) = (P::drift(y, p), P::push(y, w, p), P::input_matrix(y, p));
     core::array::from_fn(|i| {
-        let drive = (g[i].iter().zip(u)).fold(S::zero(), |sum, (g, u)| sum + *g * *u);
-        f[i] + push[i] + drive
+        let drives = g[i].iter().zip(u).map(|(g, u)| *g * *u);
+        drives.fold(f[i] + push[i], |sum, drive| sum + drive)
     })
 }
 
@@ -293,11 +293,7 @@ where
 
     fn teach(&self, model: &mut dyn AffineModel<S>) {
         if self.certainty_equivalence {
-            for row in &self.rows {
-                for j in row.parameters {
-                    model.learn(j, self.values[j]);
-                }
-            }
+            model.learn_all(&self.values);
         }
     }
 

@@ -140,8 +140,8 @@ where
         let (n, a) = (self.seen.len(), self.rotated.as_slice());
         let [floor, least] = self.floors;
         let (own, other, off) = (a[p * n + p], a[q * n + q], a[q * n + p]);
-        let alike = (own >= floor) == (other >= floor);
-        let correlated = S::of(if alike { ALIKE } else { APART });
+        let apart = (own - floor) * (other - floor) < S::zero();
+        let correlated = S::of(if apart { APART } else { ALIKE });
         off * off > correlated * (own.larger(least) * other.larger(least))
     }
 
@@ -185,29 +185,34 @@ where
         let (one, half) = (S::one(), S::of(0.5));
         let ratio = half * (other - own) / off;
         let far = ratio.abs() <= S::of(SMALL);
-        let (tangent, cosine) = if !far {
+        let (tangent, cosine) = if far {
+            steep(ratio)
+        } else {
             let first = half / ratio;
             let tangent = first - first * first * first;
             let square = tangent * tangent;
             (tangent, one - half * square * (one - S::of(0.75) * square))
-        } else {
-            let size = ratio.abs() + (one + ratio * ratio).sqrt();
-            let tangent = if ratio < S::zero() { -one } else { one } / size;
-            (tangent, one / (one + tangent * tangent).sqrt())
         };
         let sine = tangent * cosine;
         let turn = |x: S, y: S| (cosine * x - sine * y, sine * x + cosine * y);
         a[p * n + p] = (own - tangent * off).larger(S::zero());
         a[q * n + q] = (other + tangent * off).larger(S::zero());
         a[q * n + p] = S::zero();
-        for k in (0..n).filter(|k| *k != p && *k != q) {
-            let (to_p, to_q) = (p.max(k) * n + p.min(k), q.max(k) * n + q.min(k));
+        for k in 0..p {
+            let (to_p, to_q) = (p * n + k, q * n + k);
             (a[to_p], a[to_q]) = turn(a[to_p], a[to_q]);
         }
-        let directions = self.directions.as_mut_slice();
-        for k in 0..n {
-            let (to_p, to_q) = (p * n + k, q * n + k);
-            (directions[to_p], directions[to_q]) = turn(directions[to_p], directions[to_q]);
+        for k in p + 1..q {
+            let (to_p, to_q) = (k * n + p, q * n + k);
+            (a[to_p], a[to_q]) = turn(a[to_p], a[to_q]);
+        }
+        for k in q + 1..n {
+            let (to_p, to_q) = (k * n + p, k * n + q);
+            (a[to_p], a[to_q]) = turn(a[to_p], a[to_q]);
+        }
+        let (before, after) = self.directions.as_mut_slice().split_at_mut(q * n);
+        for (own, other) in before[p * n..].iter_mut().zip(&mut after[..n]).take(n) {
+            (*own, *other) = turn(*own, *other);
         }
         (self.seen[p], self.seen[q]) = turn(self.seen[p], self.seen[q]);
         self.rotations += 1;
@@ -219,6 +224,7 @@ where
 
     /// Takes out of the directions what rounding has put into them: each is made orthogonal to those
     /// before it, and as long as 1 by a step of Newton's iteration.
+    #[cold]
     fn orthonormalize(&mut self) {
         let n = self.seen.len();
         let directions = self.directions.as_mut_slice();
@@ -311,8 +317,21 @@ where
     }
 }
 
+/// Tangent and cosine of the smaller angle by which a pair is turned, where the difference of its diagonal
+/// entries is `ratio` times twice the entry beside them.
+#[cold]
+fn steep<S: Real>(ratio: S) -> (S, S) {
+    let one = S::one();
+    let size = ratio.abs() + (one + ratio * ratio).sqrt();
+    let tangent = if ratio < S::zero() { -one } else { one } / size;
+    (tangent, one / (one + tangent * tangent).sqrt())
+}
+
 fn dot<S: Real>(a: &[S], b: &[S]) -> S {
-    (a.iter().zip(b)).fold(S::zero(), |sum, (a, b)| sum + *a * *b)
+    let products = a.iter().zip(b).map(|(a, b)| *a * *b);
+    products
+        .reduce(|sum, product| sum + product)
+        .unwrap_or(S::zero())
 }
 
 #[cfg(test)]
