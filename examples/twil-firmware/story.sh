@@ -69,7 +69,7 @@ done
 "$loopsight" send story/after.toml
 wait "$run"
 
-told="the robot was told another model, with coulomb_friction"
+told="the robot was told another model"
 failed=0
 echo "== Tracking error, rms over the whole run, steady or not:"
 for signal in linear_velocity_m_per_s:mm/s angular_velocity_rad_per_s:mrad/s; do
