@@ -76,6 +76,12 @@ impl Candidate {
         smooth(&mut sharp.model, n, share * sharp.flow).then_some(sharp)
     }
 
+    /// Its own widths over which signs are smoothed.
+    pub(crate) fn own_widths(&self) -> Vec<usize> {
+        let is_width = |i: &usize| is_width(self.model.parameters[*i].declaration);
+        self.own().filter(is_width).collect()
+    }
+
     /// Whether, with these `values`, one of its speeds drowns in the width over which its sign is
     /// smoothed: what is left of it then sharpens the sign, and is no effect of its own.
     pub(crate) fn drowns(&self, values: &[f64]) -> bool {

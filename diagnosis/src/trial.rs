@@ -6,6 +6,7 @@ use loopsight_core::model::Model;
 use rayon::prelude::*;
 
 use crate::candidates::Candidate;
+use crate::diagnose::CLOSE;
 use crate::fit::Fit;
 use crate::holdout::Holdout;
 use crate::judge::{Losses, nrmse};
@@ -29,6 +30,9 @@ const LOOK_STEPS: f64 = 2.0;
 
 /// Most starts of a candidate that is looked at from where a simpler one ended.
 const GROWN: usize = 3;
+/// A simpler candidate that leaves more than so many times the least that was seen is not grown: what it
+/// leaves is not what the larger one adds.
+const WORTH_GROWING: f64 = 2.0;
 /// An effect at several channels alike is tried at each with its own parameters where it leaves less
 /// than this share of the error.
 const WORTH_DIVIDING: f64 = 0.8;
@@ -76,9 +80,12 @@ pub(crate) fn grown(
     duration: f64,
 ) -> Vec<(usize, Judged)> {
     let mut attempts: Vec<(usize, Vec<f64>)> = Vec::new();
+    let errors = looked.iter().map(|(_, found)| nrmse(&found.rank));
+    let least = errors.fold(f64::INFINITY, f64::min);
     for (i, candidate) in all.iter().enumerate() {
         let simpler = looked
             .iter()
+            .filter(|(_, found)| nrmse(&found.rank) < WORTH_GROWING * least)
             .filter(|(j, found)| {
                 let other = &all[*j];
                 let contains = candidate.meta.simpler.contains(&other.meta.id);
@@ -260,8 +267,8 @@ pub(crate) fn look(
     Judged::of(candidate.clone(), &model, solution, holdout)
 }
 
-/// The full fit of a finalist, initial states included, with intervals: as sharply as it can be where
-/// it has a sign, unless the machine does not stick so.
+/// The full fit of a finalist, initial states included, with intervals: where it has a sign, as sharply
+/// as it can be, unless the machine does not stick so; then as softly as it is.
 pub(crate) fn finish(
     first: Judged,
     holdout: &Holdout<'_>,
@@ -277,10 +284,37 @@ pub(crate) fn finish(
     });
     let broad = fully(first, holdout, nominal, f64::INFINITY);
     let error = |found: &(Judged, Fit)| nrmse(&found.0.rank);
+    let better = |a: &Option<(Judged, Fit)>, b: &Option<(Judged, Fit)>| {
+        let error = |found: &Option<(Judged, Fit)>| found.as_ref().map_or(f64::INFINITY, error);
+        CLOSE * error(a) < error(b)
+    };
+    let soft = better(&broad, &sharp).then(|| softer(broad.as_ref()?.0.clone(), holdout, nominal));
     sharp
         .into_iter()
         .chain(broad)
+        .chain(soft.flatten())
         .min_by(|a, b| error(a).total_cmp(&error(b)))
+}
+
+/// Fits also the width over which the sign is smoothed, from where a fit without it ended: what is softer
+/// than usual would else be taken for another effect. None without a sign.
+fn softer(mut first: Judged, holdout: &Holdout<'_>, nominal: &Solution) -> Option<(Judged, Fit)> {
+    let widths = first.candidate.own_widths();
+    let hold = |model: &mut Model, values: Option<&[f64]>| {
+        for i in &widths {
+            let parameter = &mut model.parameters[*i];
+            parameter.free = values.is_none();
+            parameter.value = values.map_or(parameter.value, |v| Some(v[*i]));
+        }
+    };
+    hold(&mut first.candidate.model, None);
+    let (mut judged, mut fit) = (!widths.is_empty())
+        .then(|| fully(first, holdout, nominal, f64::INFINITY))
+        .flatten()?;
+    let values = &judged.solution.values;
+    hold(&mut judged.candidate.model, Some(values));
+    hold(&mut fit.model, Some(values));
+    Some((judged, fit))
 }
 
 /// Shares of the flow over which a sign is smoothed in a final fit, which starts near its end: what
