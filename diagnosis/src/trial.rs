@@ -203,6 +203,10 @@ fn coarse(candidate: &Candidate, steps: f64) -> Model {
 /// the plain model, and may do worse at first.
 const PROMISING: f64 = 0.99;
 
+/// Share of the plain model's cost below which measured positions tell all there is, as where the
+/// position is what is measured.
+const TOLD: f64 = 0.1;
+
 /// What a candidate promises to leave of the cost, from one start; the plain model leaves `plain`.
 pub(crate) fn promise(
     candidate: &Candidate,
@@ -229,8 +233,12 @@ pub(crate) fn promise(
     problem.positions = positions(candidate, start);
     let (before, after) = problem.promise(start, &states)?;
     match shape {
-        // With measured positions also the plain model leaves less than in its free run.
-        Some(_) => (after < PROMISING * before).then(|| plain * after / before),
+        // With measured positions also the plain model leaves less than in its free run; where they leave
+        // hardly anything, the regression says nothing.
+        Some(_) => {
+            let promising = after < PROMISING * before || before < TOLD * plain;
+            promising.then(|| plain * after / before)
+        }
         None => Some(after),
     }
 }

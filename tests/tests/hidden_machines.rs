@@ -6,8 +6,8 @@
 )]
 
 use loopsight_core::model::Model;
-use loopsight_diagnosis::{FitSettings, fit};
-use loopsight_hidden::{Experiment, Robot, record};
+use loopsight_diagnosis::{FitSettings, diagnose, fit};
+use loopsight_hidden::{Experiment, Hidden, Robot, record};
 use loopsight_plants as _;
 
 /// Fitted to a clean recording, the plant leaves of another one what rounding leaves.
@@ -48,6 +48,20 @@ fn explained(robot: Robot) {
 #[test]
 fn a_clean_oscillator_is_an_oscillator() {
     explained(Robot::Oscillator);
+}
+
+/// Where the position is what is measured, the measured one tells all there is to tell, and says
+/// nothing of what a spring promises.
+#[test]
+fn a_spring_is_found_where_its_position_is_measured() {
+    let hidden = [(Hidden::CubicStiffness, 1.0)];
+    let log = record(Robot::Oscillator, &hidden, Experiment::Mixed, 31).unwrap();
+    let test = record(Robot::Oscillator, &hidden, Experiment::MultiLevel, 1031).unwrap();
+    let (model, _) = Model::from_toml("hidden", &log.model_toml).unwrap();
+    let tests = [test.run];
+    let runs = std::slice::from_ref(&log.run);
+    let found = diagnose(&model, runs, Some(&tests), &[], &|_, _| {}).unwrap();
+    assert_eq!(found.missing.unwrap().effect, "cubic_stiffness");
 }
 
 #[test]
