@@ -6,7 +6,6 @@ use loopsight_core::model::Model;
 use rayon::prelude::*;
 
 use crate::candidates::Candidate;
-use crate::diagnose::CLOSE;
 use crate::fit::Fit;
 use crate::holdout::Holdout;
 use crate::judge::{Losses, nrmse};
@@ -292,11 +291,9 @@ pub(crate) fn finish(
     });
     let broad = fully(first, holdout, nominal, f64::INFINITY);
     let error = |found: &(Judged, Fit)| nrmse(&found.0.rank);
-    let better = |a: &Option<(Judged, Fit)>, b: &Option<(Judged, Fit)>| {
-        let error = |found: &Option<(Judged, Fit)>| found.as_ref().map_or(f64::INFINITY, error);
-        CLOSE * error(a) < error(b)
-    };
-    let soft = better(&broad, &sharp).then(|| softer(broad.as_ref()?.0.clone(), holdout, nominal));
+    let of = |found: &Option<(Judged, Fit)>| found.as_ref().map_or(f64::INFINITY, error);
+    let soft =
+        (of(&broad) < of(&sharp)).then(|| softer(broad.as_ref()?.0.clone(), holdout, nominal));
     sharp
         .into_iter()
         .chain(broad)
