@@ -2,7 +2,9 @@
 
 use std::io::Write as _;
 
-use loopsight_diagnosis::{Comparison, Estimate, Fit, Held, ResidualForce, Statement, Verdict};
+use loopsight_diagnosis::{
+    Comparison, Estimate, Fit, Held, Place, ResidualForce, Statement, Verdict,
+};
 use loopsight_recordings::{Fault, Severity};
 use loopsight_report::ASTRAY;
 use serde::Serialize;
@@ -68,6 +70,11 @@ fn aligned(head: &[&str], rows: &[Vec<String>], left: usize) -> String {
         lines.push(line(row.iter().map(String::as_str).collect()));
     }
     lines.join("\n")
+}
+
+/// An effect and where it is.
+pub(crate) fn place(place: &Place) -> String {
+    format!("{} @ {}", place.effect, place.at.join("+"))
 }
 
 /// Six significant digits, without needless zeros.

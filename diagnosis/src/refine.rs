@@ -39,8 +39,8 @@ fn needless(best: &mut Refined<'_>, steps: &mut Vec<Step>) -> Result<(), FitErro
         let earlier = steps.iter().enumerate().take(steps.len().saturating_sub(1));
         let candidates = earlier.filter_map(|(index, step)| {
             let instances = instances(&best.model, step.added.as_ref()?);
-            let gone = !instances.is_empty();
-            gone.then(|| Some((index, without(&best.model, &instances)?)))?
+            instances.first()?;
+            Some((index, without(&best.model, &instances)?))
         });
         match best.takes(candidates.collect(), CLOSE)? {
             Some(index) => drop(steps.remove(index)),

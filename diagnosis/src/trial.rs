@@ -305,20 +305,19 @@ pub(crate) fn finish(
 /// than usual would else be taken for another effect. None without a sign.
 fn softer(mut first: Judged, holdout: &Holdout<'_>, nominal: &Solution) -> Option<(Judged, Fit)> {
     let widths = first.candidate.own_widths();
-    let hold = |model: &mut Model, values: Option<&[f64]>| {
+    widths.first()?;
+    for i in &widths {
+        first.candidate.model.parameters[*i].free = true;
+    }
+    let (mut judged, mut fit) = fully(first, holdout, nominal, f64::INFINITY)?;
+    // From here on they are known, as other widths are.
+    for model in [&mut judged.candidate.model, &mut fit.model] {
         for i in &widths {
             let parameter = &mut model.parameters[*i];
-            parameter.free = values.is_none();
-            parameter.value = values.map_or(parameter.value, |v| Some(v[*i]));
+            parameter.free = false;
+            parameter.value = Some(judged.solution.values[*i]);
         }
-    };
-    hold(&mut first.candidate.model, None);
-    let (mut judged, mut fit) = (!widths.is_empty())
-        .then(|| fully(first, holdout, nominal, f64::INFINITY))
-        .flatten()?;
-    let values = &judged.solution.values;
-    hold(&mut judged.candidate.model, Some(values));
-    hold(&mut fit.model, Some(values));
+    }
     Some((judged, fit))
 }
 

@@ -30,6 +30,16 @@ pub fn repository() -> PathBuf {
         .to_owned()
 }
 
+/// The folder of measurements that are not part of the project, named by `LOOPSIGHT_DATA`; where it is
+/// unset, says that nothing is tested against `what`.
+pub fn real_data(what: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("LOOPSIGHT_DATA").map(PathBuf::from);
+    if folder.is_none() {
+        println!("LOOPSIGHT_DATA is not set: nothing was tested against {what}");
+    }
+    folder
+}
+
 /// The model file of the Twil, with its encoders.
 pub fn twil_path() -> PathBuf {
     repository().join("examples/twil/model.toml")

@@ -11,6 +11,7 @@ use loopsight_core::run::Run;
 use loopsight_diagnosis::{Conclusion, Diagnosis, diagnose};
 use loopsight_hidden::{Experiment, Hidden, Recording, record_with};
 use loopsight_plants as _;
+use loopsight_tests::real_data;
 
 /// Windings of a motor with an ironless rotor, s.
 const WINDINGS: f64 = 1e-4;
@@ -160,15 +161,14 @@ fn one_thread_or_two_find_the_same() {
 /// Real logs, where they are: friction of the drivetrains and of the flywheel.
 #[test]
 fn real_logs_show_their_friction() {
-    let Ok(folder) = std::env::var("LOOPSIGHT_DATA") else {
-        println!("LOOPSIGHT_DATA is unset: real logs are not tried");
+    let Some(folder) = real_data("drivetrains and a flywheel") else {
         return;
     };
     for (file, low, high) in [
         ("team4277-drivetrain.json", 0.55, 0.75),
         ("denham-flywheel.json", 0.6, 0.8),
     ] {
-        let path = std::path::Path::new(&folder).join("frc").join(file);
+        let path = folder.join("frc").join(file);
         let source = loopsight_recordings::read(&path).unwrap();
         let (mut model, _) = Model::from_toml(file, &source.model_toml().unwrap()).unwrap();
         let signals: Vec<_> = model

@@ -7,11 +7,11 @@
     reason = "logs that are known to be readable, and a panic is how this program fails"
 )]
 
-use std::path::PathBuf;
+use std::ops::Range;
 
 use assert_cmd::Command;
 use loopsight_core::model::Model;
-use loopsight_tests::repository;
+use loopsight_tests::{real_data, repository};
 use serde_json::Value;
 
 /// What `improve` said of a log.
@@ -39,9 +39,11 @@ impl Improved {
         *self.unseen.last().unwrap()
     }
 
-    /// Place of an effect among those that were added.
-    fn position(&self, effect: &str) -> Option<usize> {
-        self.added.iter().position(|e| e == effect)
+    /// Dry friction was found first, and is this strong in the end, V.
+    fn begins_with_friction(&self, volts: Range<f64>) {
+        assert_eq!(self.added[0], "coulomb_friction", "{:?}", self.added);
+        let level = self.value("coulomb_friction.level");
+        assert!(volts.contains(&level), "{level} V");
     }
 
     /// By how much all that is late is late together, s.
@@ -64,10 +66,7 @@ impl Improved {
 /// Improves on logs of one machine, with the model file `model` of `fixtures/real` or none; none where
 /// there is no data.
 fn improved(model: Option<&str>, logs: &[&str]) -> Option<Improved> {
-    let Some(folder) = std::env::var_os("LOOPSIGHT_DATA").map(PathBuf::from) else {
-        println!("LOOPSIGHT_DATA is not set: nothing was tested against {logs:?}");
-        return None;
-    };
+    let folder = real_data(&logs.join(", "))?;
     let desk = tempfile::tempdir().unwrap();
     let best = desk.path().join("best.toml");
     let mut command = Command::new(env!("CARGO_BIN_EXE_loopsight-under-test"));
@@ -104,14 +103,7 @@ fn team4277_has_friction_and_measures_late() {
     let Some(found) = improved(None, &["frc/team4277-drivetrain.json"]) else {
         return;
     };
-    assert_eq!(
-        found.position("coulomb_friction"),
-        Some(0),
-        "{:?}",
-        found.added
-    );
-    let level = found.value("coulomb_friction.level");
-    assert!((0.5..0.8).contains(&level), "{level} V");
+    found.begins_with_friction(0.5..0.8);
     assert!((0.05..0.1).contains(&found.late()), "{} s", found.late());
     assert!(found.last() < 0.1 * found.unseen[0], "{:?}", found.unseen);
 }
@@ -122,14 +114,7 @@ fn team564_straight_has_friction_and_no_delay() {
     let Some(found) = improved(None, &["frc/team564-drivetrain-linear.json"]) else {
         return;
     };
-    assert_eq!(
-        found.position("coulomb_friction"),
-        Some(0),
-        "{:?}",
-        found.added
-    );
-    let level = found.value("coulomb_friction.level");
-    assert!((0.8..0.9).contains(&level), "{level} V");
+    found.begins_with_friction(0.8..0.9);
     assert!(found.late() < 0.035, "{} s", found.late());
 }
 
@@ -142,8 +127,7 @@ fn team564_straight_and_turning_has_scrub() {
         return;
     };
     assert_eq!(found.added[..2], ["coulomb_friction", "scrub_friction"]);
-    let level = found.value("coulomb_friction.level");
-    assert!((0.8..0.9).contains(&level), "{level} V");
+    found.begins_with_friction(0.8..0.9);
     // As the voltage at both wheels that turning takes.
     let scrub = found.value("scrub_friction.level") / found.value("K_F");
     assert!((0.4..0.9).contains(&scrub), "{scrub} V");
@@ -155,12 +139,7 @@ fn team157_measures_late() {
     let Some(found) = improved(None, &["frc/team157-drivetrain.json"]) else {
         return;
     };
-    assert_eq!(
-        found.position("coulomb_friction"),
-        Some(0),
-        "{:?}",
-        found.added
-    );
+    assert_eq!(found.added[0], "coulomb_friction", "{:?}", found.added);
     assert!(found.late() > 0.1, "{} s", found.late());
     assert!(found.last() < 0.4 * found.unseen[0], "{:?}", found.unseen);
 }
@@ -171,14 +150,7 @@ fn denhams_flywheel_has_friction_and_measures_late() {
     let Some(found) = improved(None, &["frc/denham-flywheel.json"]) else {
         return;
     };
-    assert_eq!(
-        found.position("coulomb_friction"),
-        Some(0),
-        "{:?}",
-        found.added
-    );
-    let level = found.value("coulomb_friction.level");
-    assert!((0.65..0.75).contains(&level), "{level} V");
+    found.begins_with_friction(0.65..0.75);
     assert!((0.11..0.135).contains(&found.late()), "{} s", found.late());
     assert_eq!(found.verdict, "nothing_missing");
 }
@@ -200,7 +172,7 @@ fn emps_has_friction_of_its_directions() {
         return;
     };
     assert!(
-        found.position("directional_friction").is_some(),
+        found.added.iter().any(|e| e == "directional_friction"),
         "{:?}",
         found.added
     );

@@ -10,14 +10,11 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use assert_cmd::Command;
+use loopsight_tests::real_data;
 use serde_json::Value;
 
 fn data(file: &str) -> Option<PathBuf> {
-    let Some(folder) = std::env::var_os("LOOPSIGHT_DATA") else {
-        println!("LOOPSIGHT_DATA is not set: nothing was tested against {file}");
-        return None;
-    };
-    Some(PathBuf::from(folder).join("frc").join(file))
+    Some(real_data(file)?.join("frc").join(file))
 }
 
 fn loopsight(arguments: &[&str], log: &Path, page: &Path) -> Output {

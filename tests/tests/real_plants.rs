@@ -8,13 +8,12 @@
 )]
 
 use std::ops::Range;
-use std::path::PathBuf;
 
 use loopsight_core::Signal;
 use loopsight_core::model::Model;
 use loopsight_core::run::Run;
 use loopsight_diagnosis::{Comparison, Conclusion, Fit, FitSettings, compare, diagnose, fit};
-use loopsight_tests::repository;
+use loopsight_tests::{real_data, repository};
 
 /// The model file `name`, with what `edit` makes of its text.
 fn model(name: &str, edit: impl Fn(&str) -> String) -> Model {
@@ -25,11 +24,7 @@ fn model(name: &str, edit: impl Fn(&str) -> String) -> Model {
 
 /// The rows `rows` of a recording, for `model`; none where there is no data.
 fn recording(model: &mut Model, file: &str, rows: Range<usize>) -> Option<Vec<Run>> {
-    let Some(folder) = std::env::var_os("LOOPSIGHT_DATA") else {
-        println!("LOOPSIGHT_DATA is not set: nothing was tested against {file}");
-        return None;
-    };
-    let source = loopsight_recordings::read(&PathBuf::from(folder).join(file)).unwrap();
+    let source = loopsight_recordings::read(&real_data(file)?.join(file)).unwrap();
     let plant = model.plant;
     let signals: Vec<Signal> = plant.states.iter().chain(plant.outputs).copied().collect();
     let mapped = loopsight_recordings::map(&source, plant.inputs, &signals, &model.log).unwrap();

@@ -138,11 +138,7 @@ fn row(explanation: &Explanation) -> Vec<String> {
         .map(|(name, p)| format!("{name} {} {}", output::number(p.value), p.unit))
         .collect();
     vec![
-        format!(
-            "{} @ {}",
-            explanation.place.effect,
-            explanation.place.at.join("+")
-        ),
+        output::place(&explanation.place),
         output::percent(explanation.nrmse),
         format!("{:.1}", explanation.significance),
         parameters.join(", "),

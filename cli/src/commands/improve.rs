@@ -2,7 +2,7 @@
 
 use loopsight_core::config::{Source, Step};
 use loopsight_core::model::{Attached, Model, ModelParameter};
-use loopsight_diagnosis::{Improvement, Place, improve};
+use loopsight_diagnosis::{Improvement, improve};
 use loopsight_report::{improvement_page, save};
 
 use crate::arguments::ImproveOptions;
@@ -106,10 +106,6 @@ fn best_text(source: &Source, before: &Model, best: &Model) -> String {
     present.with_values(&values)
 }
 
-fn written(place: &Place) -> String {
-    format!("{} @ {}", place.effect, place.at.join("+"))
-}
-
 fn text(improvement: &Improvement) -> String {
     let rows: Vec<Vec<String>> = improvement
         .steps
@@ -118,7 +114,7 @@ fn text(improvement: &Improvement) -> String {
             vec![
                 step.added.as_ref().map_or_else(
                     || "the model as it is".to_owned(),
-                    |p| format!("+ {}", written(p)),
+                    |p| format!("+ {}", output::place(p)),
                 ),
                 output::percent(step.nrmse_fit),
                 output::percent(step.nrmse_test),
@@ -137,12 +133,12 @@ fn text(improvement: &Improvement) -> String {
         let others: Vec<String> = improvement
             .not_told_from(step)
             .iter()
-            .map(|p| written(p))
+            .map(|p| output::place(p))
             .collect();
         if let (Some(added), [_, ..]) = (&step.added, &others[..]) {
             text.push_str(&format!(
                 "not told from {} when it was added: {}\n",
-                written(added),
+                output::place(added),
                 others.join(", ")
             ));
         }
