@@ -14,7 +14,7 @@ use crate::choose::choose;
 use crate::conclusion::{Conclusion, Diagnosis, Explanation, Level, Place};
 use crate::fit::{Estimate, Fit, FitError, FitSettings, Verdict};
 use crate::floor::floor;
-use crate::holdout::Holdout;
+use crate::holdout::{Holdout, Judgement};
 use crate::judge::{Losses, advantage, nrmse, significance};
 use crate::observer::{Held, hold_alike};
 use crate::output_error::prepare;
@@ -103,8 +103,10 @@ pub(crate) fn diagnose_above(
     let plain = problem
         .residual_vector(&problem.pack(&nominal.values, &nominal.states))
         .norm_squared();
-    let nominal_losses = holdout.judge(model, &nominal);
-    let nominal_rank = holdout.rank(model, &nominal, &nominal_losses);
+    let Judgement {
+        losses: nominal_losses,
+        rank: nominal_rank,
+    } = holdout.judge(model, &nominal);
     let nominal_error = nrmse(&nominal_losses);
     let nominal_fit = nrmse(&holdout.fitted(model, &nominal));
     let mut fitted_nominal = model.clone();

@@ -4,7 +4,7 @@ use loopsight_core::model::Model;
 use loopsight_core::run::Run;
 
 use crate::judge::Losses;
-use crate::prediction::predict;
+use crate::prediction::{InitialStates, predict};
 use crate::problem::Solution;
 use crate::score::Tally;
 
@@ -51,66 +51,50 @@ impl<'a> Holdout<'a> {
         }
     }
 
-    /// Losses on what was not seen: mean over the signals of their squared errors over their
-    /// variances.
-    pub(crate) fn judge(&self, model: &Model, solution: &Solution) -> Losses {
-        match self.test {
-            Some(test) => {
-                let initial =
-                    crate::prediction::InitialStates::estimate(model, &solution.values, test);
-                losses(
-                    model,
-                    &solution.values,
-                    &initial.states,
-                    test,
-                    &self.std_test,
-                    None,
-                )
-            }
-            None => {
-                let unseen: Option<Vec<Vec<bool>>> = self.seen.as_ref().map(|seen| {
-                    seen.iter()
-                        .map(|run| run.iter().map(|s| !s).collect())
-                        .collect()
-                });
-                let (values, states) = (&solution.values, &solution.states);
-                losses(
-                    model,
-                    values,
-                    states,
-                    self.runs,
-                    &self.std_test,
-                    unseen.as_deref(),
-                )
-            }
-        }
-    }
-
-    /// Losses that candidates are ranked by: those of [`Holdout::judge`] and those on what was seen. A transient happens once in a run: whether it was
-    /// explained must count, wherever it falls. A handful of parameters more cannot fake that on
-    /// thousands of samples.
-    pub(crate) fn rank(&self, model: &Model, solution: &Solution, judged: &Losses) -> Losses {
-        if self.test.is_some() {
-            let mut all = judged.clone();
-            all.extend(self.fitted(model, solution));
-            return all;
-        }
-        let (values, states) = (&solution.values, &solution.states);
-        losses(model, values, states, self.runs, &self.std_test, None)
+    /// Losses of a solution, in one pass over the data.
+    pub(crate) fn judge(&self, model: &Model, solution: &Solution) -> Judgement {
+        let Some(test) = self.test else {
+            let rank = losses(model, solution, self.runs, &self.std_test);
+            return Judgement {
+                losses: self.part(&rank, false),
+                rank,
+            };
+        };
+        let values = solution.values.clone();
+        let states = InitialStates::estimate(model, &values, test).states;
+        let losses = losses(model, &Solution { values, states }, test, &self.std_test);
+        let mut rank = losses.clone();
+        rank.extend(self.fitted(model, solution));
+        Judgement { losses, rank }
     }
 
     /// Losses on what was seen.
     pub(crate) fn fitted(&self, model: &Model, solution: &Solution) -> Losses {
-        let (values, states) = (&solution.values, &solution.states);
-        losses(
-            model,
-            values,
-            states,
-            self.runs,
-            &self.std_fit,
-            self.seen.as_deref(),
-        )
+        let all = losses(model, solution, self.runs, &self.std_fit);
+        self.part(&all, true)
     }
+
+    /// Of the losses on all samples of `runs` those that a fit saw, or did not.
+    fn part(&self, all: &Losses, seen: bool) -> Losses {
+        let Some(mask) = &self.seen else {
+            return all.clone();
+        };
+        let samples = all.iter().zip(mask.iter().flatten());
+        samples
+            .filter(|(_, s)| **s == seen)
+            .map(|(loss, _)| *loss)
+            .collect()
+    }
+}
+
+/// How well a solution does.
+pub(crate) struct Judgement {
+    /// Losses on what was not seen: mean over the signals of their squared errors over their variances.
+    pub(crate) losses: Losses,
+    /// What candidates are ranked by: those and the losses on what was seen. A transient happens once in
+    /// a run: whether it was explained must count, wherever it falls. A handful of parameters more
+    /// cannot fake that on thousands of samples.
+    pub(crate) rank: Losses,
 }
 
 fn deviations(runs: &[Run], n: usize) -> Vec<f64> {
@@ -127,22 +111,13 @@ fn deviations(runs: &[Run], n: usize) -> Vec<f64> {
         .collect()
 }
 
-fn losses(
-    model: &Model,
-    values: &[f64],
-    states: &[nalgebra::DVector<f64>],
-    runs: &[Run],
-    std: &[f64],
-    only: Option<&[Vec<bool>]>,
-) -> Losses {
+/// Losses on all samples of `runs`.
+fn losses(model: &Model, solution: &Solution, runs: &[Run], std: &[f64]) -> Losses {
     let n = std.len();
     let mut all = Losses::new();
-    for (index, (run, x0)) in runs.iter().zip(states).enumerate() {
-        let predicted = predict(model, values, x0.as_slice(), run);
+    for (run, x0) in runs.iter().zip(&solution.states) {
+        let predicted = predict(model, &solution.values, x0.as_slice(), run);
         for k in 0..run.len() {
-            if only.is_some_and(|o| !o[index][k]) {
-                continue;
-            }
             let loss: f64 = (0..n)
                 .map(|i| {
                     let e = (run.sample(k)[i] - predicted[k * n + i]) / std[i];

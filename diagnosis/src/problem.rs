@@ -251,17 +251,20 @@ impl<'a> Problem<'a> {
     /// Scales the unknowns so that each moves the residuals alike, as the damping of the solver
     /// expects (J. J. Moré, 1978, "The Levenberg-Marquardt algorithm", section 6).
     pub(crate) fn balance(&mut self, mut scaled: DVector<f64>) -> DVector<f64> {
-        let (_, jacobian) = self.linearise(&scaled);
-        for (i, column) in jacobian.column_iter().enumerate() {
+        let (residual, mut jacobian) = self.linearise(&scaled);
+        for (i, mut column) in jacobian.column_iter_mut().enumerate() {
             let norm = column.norm();
             if norm > DEAD && norm.is_finite() {
                 self.scales[i] /= norm;
                 self.lower[i] *= norm;
                 self.upper[i] *= norm;
                 scaled[i] *= norm;
+                column /= norm;
             }
         }
-        self.cache.replace(None);
+        // The same place in other units: there is nothing to be simulated again.
+        self.cache
+            .replace(Some((scaled.clone(), residual, jacobian)));
         scaled
     }
 
@@ -463,10 +466,17 @@ impl Residual for Borrowed<'_, '_> {
 impl Jacobian for Borrowed<'_, '_> {
     type Jacobian = DMatrix<f64>;
     fn jacobian(&self, scaled: &DVector<f64>) -> Result<DMatrix<f64>, Infallible> {
+        Ok(self.residual_and_jacobian(scaled)?.1)
+    }
+    /// The simulation that differentiates predicts as well.
+    fn residual_and_jacobian(
+        &self,
+        scaled: &DVector<f64>,
+    ) -> Result<(DVector<f64>, DMatrix<f64>), Infallible> {
         let (residual, jacobian) = self.0.linearise(scaled);
         self.0.evaluations.set(self.0.evaluations.get() + 1);
         (self.0.progress)(self.0.evaluations.get(), residual.norm());
-        Ok(jacobian)
+        Ok((residual, jacobian))
     }
 }
 

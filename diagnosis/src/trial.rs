@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::candidates::Candidate;
 use crate::fit::Fit;
-use crate::holdout::Holdout;
+use crate::holdout::{Holdout, Judgement};
 use crate::judge::{Losses, nrmse};
 use crate::positions::Positions;
 use crate::problem::{Effort, Problem, Solution};
@@ -54,8 +54,7 @@ impl Judged {
         solution: Solution,
         holdout: &Holdout<'_>,
     ) -> Option<Self> {
-        let losses = holdout.judge(model, &solution);
-        let rank = holdout.rank(model, &solution, &losses);
+        let Judgement { losses, rank } = holdout.judge(model, &solution);
         nrmse(&rank).is_finite().then_some(Self {
             candidate,
             solution,
