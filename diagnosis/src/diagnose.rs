@@ -1,12 +1,10 @@
 //! Which effect is missing.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use loopsight_core::model::Model;
 use loopsight_core::run::Run;
 use loopsight_recordings::{Fault, Severity};
-use rayon::prelude::*;
 
 use crate::advice::{self, Advice};
 use crate::candidates::{Candidate, candidates};
@@ -21,20 +19,13 @@ use crate::output_error::prepare;
 use crate::prediction::signal_rms;
 use crate::problem::Problem;
 use crate::residual_force;
+use crate::search::Search;
 use crate::sufficiency;
-use crate::trial::{FINAL, Judged, finish, first_starts, grown, look, promise};
+use crate::trial::{FINAL, Judged};
 use crate::where_it_fails::where_it_fails;
 
 /// Explanations that are reported.
 const REPORTED: usize = 12;
-/// Candidates that are fitted to the end.
-const FINALISTS: usize = 9;
-/// Starts of candidates that promise most and are looked at.
-const LOOKED_AT: usize = 36;
-/// Starts of one candidate that are looked at.
-const STARTS: usize = 2;
-/// Places of one effect among the finalists.
-const SIBLINGS: usize = 2;
 /// An explanation must beat the plain model by so many standard errors on data neither saw. There
 /// are about a hundred candidates: a chance of 1e-4 each is one of 1 % for all.
 const BEATS: f64 = 3.7;
@@ -115,96 +106,15 @@ pub(crate) fn diagnose_above(
     let rms = signal_rms(model, &nominal.values, &nominal.states, runs);
     let held = runs.iter().any(|run| run.observer.is_some());
     let all = candidates(&fitted_nominal, &rms, held);
-    let done = AtomicU64::new(0);
-    let duration = runs.iter().map(Run::duration).fold(0.0, f64::max);
-    let attempts: Vec<(usize, Vec<f64>)> = all
-        .iter()
-        .enumerate()
-        .filter(|(_, c)| !c.separate)
-        .flat_map(|(i, c)| {
-            first_starts(c, &fitted_nominal, duration)
-                .into_iter()
-                .map(move |start| (i, start))
-        })
-        .collect();
-    let total = (attempts.len() + LOOKED_AT) as u64;
-    let mut promising: Vec<(f64, usize)> = attempts
-        .par_iter()
-        .enumerate()
-        .filter_map(|(k, (i, start))| {
-            let promise = promise(&all[*i].chosen(start), start, &holdout, &nominal, plain);
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
-            Some((promise?, k))
-        })
-        .collect();
-    promising.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    // No effect with many starts may crowd the others out.
-    let mut starts_taken = vec![0; all.len()];
-    promising.retain(|(_, k)| {
-        let taken = &mut starts_taken[attempts[*k].0];
-        *taken += 1;
-        *taken <= STARTS
-    });
-    promising.truncate(LOOKED_AT);
-    let mut looked: Vec<(usize, Judged)> = promising
-        .par_iter()
-        .filter_map(|(_, k)| {
-            let (i, start) = &attempts[*k];
-            let found = look(&all[*i].chosen(start), start, &holdout, &nominal);
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
-            Some((*i, found?))
-        })
-        .collect();
-    looked.extend(grown(
-        &all,
-        &looked,
-        &holdout,
-        &nominal,
-        &nominal_rank,
-        duration,
-    ));
-    looked.sort_by(|a, b| nrmse(&a.1.rank).total_cmp(&nrmse(&b.1.rank)));
-    let mut judged: Vec<Judged> = Vec::new();
-    for k in 0..looked.len() {
-        let (i, found) = &looked[k];
-        let id = found.candidate.meta.id;
-        // Of several starts of one candidate the best counts, and of an effect and its special case
-        // the special case, unless it is worse.
-        let again = looked[..k].iter().any(|(j, _)| i == j);
-        let close = |other: &Judged| nrmse(&other.rank) < CLOSE * nrmse(&found.rank);
-        let needless = looked.iter().any(|(_, other)| {
-            let special = found
-                .candidate
-                .meta
-                .simpler
-                .contains(&other.candidate.meta.id)
-                && found.candidate.at == other.candidate.at;
-            let alike = found.candidate.separate
-                && other.candidate.meta.id == id
-                && other.candidate.at == found.candidate.at
-                && !other.candidate.separate;
-            // On a straight run one wheel stands for both: then both.
-            let wider = other.candidate.meta.id == id
-                && !other.candidate.separate
-                && found
-                    .candidate
-                    .at
-                    .iter()
-                    .all(|c| other.candidate.at.contains(c))
-                && other.candidate.at.len() > found.candidate.at.len();
-            (special || alike || wider) && close(other)
-        });
-        let siblings = judged.iter().filter(|j| j.candidate.meta.id == id).count();
-        if !again && !needless && siblings < SIBLINGS && judged.len() < FINALISTS {
-            judged.push(found.clone());
-        }
-    }
-
-    let mut finalists: Vec<(Judged, Fit)> = judged
-        .into_par_iter()
-        .filter_map(|first| finish(first, &holdout, &nominal))
-        .collect();
-    finalists.sort_by(|a, b| nrmse(&a.0.rank).total_cmp(&nrmse(&b.0.rank)));
+    let search = Search {
+        all: &all,
+        holdout: &holdout,
+        model: &fitted_nominal,
+        nominal: &nominal,
+        cost: plain,
+        rank: &nominal_rank,
+    };
+    let finalists = search.finalists(progress);
 
     let floor = floor(model, test.unwrap_or(runs));
     let mut explanations = explain(&finalists, &nominal_rank, &holdout);

@@ -29,6 +29,8 @@ mod residual_force;
 mod rls;
 mod rounding;
 mod score;
+mod search;
+mod starts;
 mod stride;
 mod sufficiency;
 pub mod tracking;

@@ -1,9 +1,6 @@
-//! One candidate at a time: where to start it, a first look, the full fit.
-
-use std::collections::BTreeMap;
+//! One candidate at a time: what it promises, a first look, the full fit.
 
 use loopsight_core::model::Model;
-use rayon::prelude::*;
 
 use crate::candidates::Candidate;
 use crate::fit::Fit;
@@ -27,14 +24,6 @@ pub(crate) const FINAL: Effort = Effort {
 const PROMISE_STEPS: f64 = 4.0;
 const LOOK_STEPS: f64 = 2.0;
 
-/// Most starts of a candidate that is looked at from where a simpler one ended.
-const GROWN: usize = 3;
-/// A simpler candidate that leaves more than so many times the least that was seen is not grown: what it
-/// leaves is not what the larger one adds.
-const WORTH_GROWING: f64 = 2.0;
-/// An effect at several channels alike is tried at each with its own parameters where it leaves less
-/// than this share of the error.
-const WORTH_DIVIDING: f64 = 0.8;
 /// A candidate, fitted and judged.
 #[derive(Clone)]
 pub(crate) struct Judged {
@@ -62,124 +51,6 @@ impl Judged {
             rank,
         })
     }
-}
-
-/// Shares of the flow that a speed to be estimated starts from.
-const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
-
-/// Looks at candidates that contain a simpler one from where the simpler one ended: strong
-/// breakaway friction is found from dry friction, not from none, and two levels from one for both.
-pub(crate) fn grown(
-    all: &[Candidate],
-    looked: &[(usize, Judged)],
-    holdout: &Holdout<'_>,
-    nominal: &Solution,
-    nominal_rank: &Losses,
-    duration: f64,
-) -> Vec<(usize, Judged)> {
-    let mut attempts: Vec<(usize, Vec<f64>)> = Vec::new();
-    let errors = looked.iter().map(|(_, found)| nrmse(&found.rank));
-    let least = errors.fold(f64::INFINITY, f64::min);
-    for (i, candidate) in all.iter().enumerate() {
-        let simpler = looked
-            .iter()
-            .filter(|(_, found)| nrmse(&found.rank) < WORTH_GROWING * least)
-            .filter(|(j, found)| {
-                let other = &all[*j];
-                let contains = candidate.meta.simpler.contains(&other.meta.id);
-                let divides = candidate.separate
-                    && candidate.meta.id == other.meta.id
-                    && nrmse(&found.rank) < WORTH_DIVIDING * nrmse(nominal_rank);
-                (contains && !candidate.separate && candidate.replaces.is_none() || divides)
-                    && candidate.at == other.at
-                    && !other.separate
-            })
-            .min_by(|a, b| nrmse(&a.1.rank).total_cmp(&nrmse(&b.1.rank)));
-        let Some((j, found)) = simpler else { continue };
-        let own = all[*j].own();
-        let values = &found.solution.values;
-        let known: BTreeMap<&str, f64> = all[*j]
-            .meta
-            .parameters
-            .iter()
-            .zip(&values[own.clone()])
-            .map(|(declaration, value)| (declaration.id, *value))
-            .collect();
-        let starts = starts(candidate, &values[..own.start], &known, duration);
-        if starts.len() <= GROWN {
-            attempts.extend(starts.into_iter().map(|start| (i, start)));
-        }
-    }
-    attempts
-        .par_iter()
-        .filter_map(|(i, start)| Some((*i, look(&all[*i].chosen(start), start, holdout, nominal)?)))
-        .collect()
-}
-
-/// Values to start a candidate from: the `nominal` model's, without those of an effect that it takes
-/// the place of; what has the same name begins where that one was.
-pub(crate) fn first_starts(candidate: &Candidate, nominal: &Model, duration: f64) -> Vec<Vec<f64>> {
-    let mut base = nominal.values();
-    let mut known = BTreeMap::new();
-    if let Some((_, gone)) = &candidate.replaces {
-        for parameter in &nominal.parameters[gone.clone()] {
-            if let (true, Some(value)) = (parameter.free, parameter.value) {
-                known.insert(parameter.declaration.id, value);
-            }
-        }
-        base.drain(gone.clone());
-    }
-    starts(candidate, &base, &known, duration)
-}
-
-/// Values to start a candidate from: those of the rest of the model from `base`, its own as `known`,
-/// else a noticeable step from neutral.
-fn starts(
-    candidate: &Candidate,
-    base: &[f64],
-    known: &BTreeMap<&str, f64>,
-    duration: f64,
-) -> Vec<Vec<f64>> {
-    let mut all = vec![base.to_vec()];
-    let regressed = candidate.shape().is_some();
-    for i in candidate.own() {
-        let parameter = &candidate.model.parameters[i];
-        let nearest = |value: f64| parameter.declaration.nearest(value);
-        let neutral = parameter.value.unwrap_or(0.0);
-        let listed = parameter.starts(duration);
-        let values: Vec<f64> = if let Some(value) = known.get(parameter.declaration.id) {
-            vec![*value]
-        } else if !parameter.free && listed.is_empty() {
-            vec![neutral]
-        } else if parameter.free && parameter.declaration.unit == "flow" && candidate.flow > 0.0 {
-            FLOW_STARTS
-                .iter()
-                .map(|s| nearest(s * candidate.flow))
-                .collect()
-        } else if listed.is_empty() {
-            // Where the position is measured, what is linear in the effect is regressed.
-            let neutral_first = regressed && parameter.declaration.linear;
-            let step = if neutral_first {
-                0.0
-            } else {
-                parameter.scale()
-            };
-            vec![nearest(neutral + step)]
-        } else {
-            listed.into_iter().map(nearest).collect()
-        };
-        all = all
-            .iter()
-            .flat_map(|start| {
-                values.iter().map(move |value| {
-                    let mut start = start.clone();
-                    start.push(*value);
-                    start
-                })
-            })
-            .collect();
-    }
-    all
 }
 
 /// The model of a candidate with coarser steps, and with softened signs where it begins with a

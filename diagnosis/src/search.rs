@@ -1,0 +1,195 @@
+//! Which candidates are looked at, and which of them are fitted to the end.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use loopsight_core::model::Model;
+use loopsight_core::run::Run;
+use rayon::prelude::*;
+
+use crate::candidates::Candidate;
+use crate::diagnose::CLOSE;
+use crate::fit::Fit;
+use crate::holdout::Holdout;
+use crate::judge::{Losses, nrmse};
+use crate::problem::Solution;
+use crate::starts::{first_starts, grown_starts};
+use crate::trial::{Judged, finish, look, promise};
+
+/// Candidates that are fitted to the end.
+const FINALISTS: usize = 9;
+/// Starts of candidates that promise most and are looked at.
+const LOOKED_AT: usize = 36;
+/// Starts of one candidate that are looked at.
+const STARTS: usize = 2;
+/// Places of one effect among the finalists.
+const SIBLINGS: usize = 2;
+/// Most starts of a candidate that is looked at from where a simpler one ended.
+const GROWN: usize = 3;
+/// A simpler candidate that leaves more than so many times the least that was seen is not grown: what it
+/// leaves is not what the larger one adds.
+const WORTH_GROWING: f64 = 2.0;
+/// An effect at several channels alike is tried at each with its own parameters where it leaves less
+/// than this share of the error.
+const WORTH_DIVIDING: f64 = 0.8;
+
+/// A candidate by its index, and where to start it from.
+type Attempt = (usize, Vec<f64>);
+
+/// Everything that a search among candidates goes by.
+pub(crate) struct Search<'a> {
+    pub(crate) all: &'a [Candidate],
+    pub(crate) holdout: &'a Holdout<'a>,
+    /// The plain model, its fit, what that leaves of the cost, and its losses.
+    pub(crate) model: &'a Model,
+    pub(crate) nominal: &'a Solution,
+    pub(crate) cost: f64,
+    pub(crate) rank: &'a Losses,
+}
+
+impl Search<'_> {
+    /// The candidates that do best, fitted to the end, the best first.
+    ///
+    /// All are asked what one step promises, some are looked at, those that contain one that did well
+    /// from where that one ended; the best are fitted.
+    pub(crate) fn finalists(&self, progress: &(dyn Fn(u64, u64) + Sync)) -> Vec<(Judged, Fit)> {
+        let runs = self.holdout.runs.iter();
+        let duration = runs.map(Run::duration).fold(0.0, f64::max);
+        let attempts: Vec<Attempt> = (self.all.iter().enumerate())
+            .filter(|(_, c)| !c.separate)
+            .flat_map(|(i, c)| {
+                let starts = first_starts(c, self.model, duration);
+                starts.into_iter().map(move |start| (i, start))
+            })
+            .collect();
+        let (done, total) = (AtomicU64::new(0), (attempts.len() + LOOKED_AT) as u64);
+        let tick = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+
+        let promising = self.promising(attempts, &tick);
+        let simple = |i: usize| !promising.iter().any(|(j, _)| self.grows(i, *j));
+        let (first, larger): (Vec<Attempt>, Vec<Attempt>) =
+            promising.iter().cloned().partition(|(i, _)| simple(*i));
+        let mut looked = self.looks(&first, &tick);
+        // What contains another candidate is looked at after it, from where that one ended; as it promised
+        // only where that one led nowhere.
+        let mut waiting = larger;
+        loop {
+            let mut next = self.grown(&looked, duration);
+            waiting.retain(|(i, _)| !next.iter().any(|(j, _)| i == j));
+            next.append(&mut waiting);
+            if next.is_empty() {
+                break;
+            }
+            looked.extend(self.looks(&next, &tick));
+        }
+        let mut finalists: Vec<(Judged, Fit)> = contest(looked)
+            .into_par_iter()
+            .filter_map(|first| finish(first, self.holdout, self.nominal))
+            .collect();
+        finalists.sort_by(|a, b| nrmse(&a.0.rank).total_cmp(&nrmse(&b.0.rank)));
+        finalists
+    }
+
+    /// The starts that promise most, the best first.
+    fn promising(&self, attempts: Vec<Attempt>, tick: &(dyn Fn() + Sync)) -> Vec<Attempt> {
+        let mut promising: Vec<(f64, Attempt)> = attempts
+            .into_par_iter()
+            .filter_map(|(i, start)| {
+                let candidate = self.all[i].chosen(&start);
+                let promise = promise(&candidate, &start, self.holdout, self.nominal, self.cost);
+                tick();
+                Some((promise?, (i, start)))
+            })
+            .collect();
+        promising.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // No effect with many starts may crowd the others out.
+        let mut taken = vec![0; self.all.len()];
+        promising.retain(|(_, (i, _))| {
+            taken[*i] += 1;
+            taken[*i] <= STARTS
+        });
+        promising.truncate(LOOKED_AT);
+        promising.into_iter().map(|(_, attempt)| attempt).collect()
+    }
+
+    fn looks(&self, attempts: &[Attempt], tick: &(dyn Fn() + Sync)) -> Vec<(usize, Judged)> {
+        attempts
+            .par_iter()
+            .filter_map(|(i, start)| {
+                let found = look(
+                    &self.all[*i].chosen(start),
+                    start,
+                    self.holdout,
+                    self.nominal,
+                );
+                tick();
+                Some((*i, found?))
+            })
+            .collect()
+    }
+
+    /// Whether a candidate may be found from where another one ended: strong breakaway friction is
+    /// found from dry friction, not from none, and two levels from one for both.
+    fn grows(&self, i: usize, from: usize) -> bool {
+        let (candidate, other) = (&self.all[i], &self.all[from]);
+        let contains = candidate.meta.simpler.contains(&other.meta.id)
+            && !candidate.separate
+            && candidate.replaces.is_none();
+        let divides = candidate.separate && candidate.meta.id == other.meta.id;
+        (contains || divides) && candidate.at == other.at && !other.separate
+    }
+
+    /// Attempts at candidates that were not looked at yet, from where simpler ones ended.
+    fn grown(&self, looked: &[(usize, Judged)], duration: f64) -> Vec<Attempt> {
+        let error = |found: &Judged| nrmse(&found.rank);
+        let least = (looked.iter().map(|(_, found)| error(found))).fold(f64::INFINITY, f64::min);
+        let new = (0..self.all.len()).filter(|i| looked.iter().all(|(j, _)| i != j));
+        new.filter_map(|i| {
+            let candidate = &self.all[i];
+            let worth = |found: &Judged| {
+                let divided = error(found) < WORTH_DIVIDING * nrmse(self.rank);
+                error(found) < WORTH_GROWING * least && (!candidate.separate || divided)
+            };
+            let simpler = looked
+                .iter()
+                .filter(|(j, found)| self.grows(i, *j) && worth(found))
+                .min_by(|a, b| error(&a.1).total_cmp(&error(&b.1)));
+            let starts = grown_starts(candidate, &simpler?.1, duration);
+            (starts.len() <= GROWN).then(|| starts.into_iter().map(move |start| (i, start)))
+        })
+        .flatten()
+        .collect()
+    }
+}
+
+/// Those of the candidates looked at that are fitted to the end, the best first.
+fn contest(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
+    looked.sort_by(|a, b| nrmse(&a.1.rank).total_cmp(&nrmse(&b.1.rank)));
+    let mut finalists: Vec<Judged> = Vec::new();
+    for k in 0..looked.len() {
+        let (i, found) = &looked[k];
+        let id = found.candidate.meta.id;
+        // Of several starts of one candidate the best counts.
+        let again = looked[..k].iter().any(|(j, _)| i == j);
+        let needless = looked.iter().any(|(_, other)| {
+            nrmse(&other.rank) < CLOSE * nrmse(&found.rank)
+                && spares(&other.candidate, &found.candidate)
+        });
+        let siblings = finalists.iter().filter(|j| j.candidate.meta.id == id);
+        if !again && !needless && siblings.count() < SIBLINGS && finalists.len() < FINALISTS {
+            finalists.push(found.clone());
+        }
+    }
+    finalists
+}
+
+/// Whether a candidate is needless beside another one that is about as good: its special case, the same
+/// alike at all channels, or at more of them (on a straight run one wheel stands for both: then both).
+fn spares(other: &Candidate, candidate: &Candidate) -> bool {
+    let same = other.meta.id == candidate.meta.id && !other.separate;
+    let special = candidate.meta.simpler.contains(&other.meta.id) && candidate.at == other.at;
+    let alike = same && candidate.separate && other.at == candidate.at;
+    let wider = same
+        && candidate.at.iter().all(|c| other.at.contains(c))
+        && other.at.len() > candidate.at.len();
+    special || alike || wider
+}

@@ -1,0 +1,93 @@
+//! From where a candidate is tried.
+
+use std::collections::BTreeMap;
+
+use loopsight_core::model::Model;
+
+use crate::candidates::Candidate;
+use crate::trial::Judged;
+
+/// Shares of the flow that a speed to be estimated starts from.
+const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
+
+/// Values to start a candidate from: the `nominal` model's, without those of an effect that it takes
+/// the place of; what has the same name begins where that one was.
+pub(crate) fn first_starts(candidate: &Candidate, nominal: &Model, duration: f64) -> Vec<Vec<f64>> {
+    let mut base = nominal.values();
+    let mut known = BTreeMap::new();
+    if let Some((_, gone)) = &candidate.replaces {
+        for parameter in &nominal.parameters[gone.clone()] {
+            if let (true, Some(value)) = (parameter.free, parameter.value) {
+                known.insert(parameter.declaration.id, value);
+            }
+        }
+        base.drain(gone.clone());
+    }
+    starts(candidate, &base, &known, duration)
+}
+
+/// Values to start a candidate from where `simpler` ended.
+pub(crate) fn grown_starts(
+    candidate: &Candidate,
+    simpler: &Judged,
+    duration: f64,
+) -> Vec<Vec<f64>> {
+    let own = simpler.candidate.own();
+    let values = &simpler.solution.values;
+    let declarations = simpler.candidate.meta.parameters.iter();
+    let known = declarations
+        .map(|declaration| declaration.id)
+        .zip(values[own.clone()].iter().copied())
+        .collect();
+    starts(candidate, &values[..own.start], &known, duration)
+}
+
+/// Values to start a candidate from: those of the rest of the model from `base`, its own as `known`,
+/// else a noticeable step from neutral.
+fn starts(
+    candidate: &Candidate,
+    base: &[f64],
+    known: &BTreeMap<&str, f64>,
+    duration: f64,
+) -> Vec<Vec<f64>> {
+    let mut all = vec![base.to_vec()];
+    let regressed = candidate.shape().is_some();
+    for i in candidate.own() {
+        let parameter = &candidate.model.parameters[i];
+        let nearest = |value: f64| parameter.declaration.nearest(value);
+        let neutral = parameter.value.unwrap_or(0.0);
+        let listed = parameter.starts(duration);
+        let values: Vec<f64> = if let Some(value) = known.get(parameter.declaration.id) {
+            vec![*value]
+        } else if !parameter.free && listed.is_empty() {
+            vec![neutral]
+        } else if parameter.free && parameter.declaration.unit == "flow" && candidate.flow > 0.0 {
+            FLOW_STARTS
+                .iter()
+                .map(|s| nearest(s * candidate.flow))
+                .collect()
+        } else if listed.is_empty() {
+            // Where the position is measured, what is linear in the effect is regressed.
+            let neutral_first = regressed && parameter.declaration.linear;
+            let step = if neutral_first {
+                0.0
+            } else {
+                parameter.scale()
+            };
+            vec![nearest(neutral + step)]
+        } else {
+            listed.into_iter().map(nearest).collect()
+        };
+        all = all
+            .iter()
+            .flat_map(|start| {
+                values.iter().map(move |value| {
+                    let mut start = start.clone();
+                    start.push(*value);
+                    start
+                })
+            })
+            .collect();
+    }
+    all
+}
