@@ -7,8 +7,9 @@ use num_traits::{One, Zero};
 
 use crate::Real;
 
-/// Number of derivatives one [`Dual`] carries; a fit with more parameters makes several passes.
-pub const DUAL_WIDTH: usize = 8;
+/// Number of derivatives one [`Dual`] carries; a fit with more unknowns makes several passes. A
+/// differential drive has six parameters and two initial states that show: with two of an effect it takes one pass.
+pub const DUAL_WIDTH: usize = 10;
 
 /// A value with its derivatives by [`DUAL_WIDTH`] quantities at once: forward-mode differentiation.
 ///
@@ -164,6 +165,10 @@ impl Real for Dual {
     }
     fn value(self) -> f64 {
         self.value
+    }
+    #[inline(always)]
+    fn times(self, constant: Self) -> Self {
+        self.chain(self.value * constant.value, constant.value)
     }
     fn sin(self) -> Self {
         let (sin, cos) = libm::sincos(self.value);

@@ -91,8 +91,8 @@ pub struct Reading<'a, S> {
     pub side: S,
     /// The channel's own signal is the one that plays [`Role::Position`]: an angle, not its rate.
     pub is_position: bool,
-    /// The signals by role; roles that the effect does not declare are zero.
-    pub roles: [S; Role::COUNT],
+    /// The signals by role, where the channel binds one and the effect declares it.
+    pub roles: [Option<&'a S>; Role::COUNT],
     /// All signals of the plant: states, inputs, outputs. Outputs that nobody asked for may be of
     /// an earlier instant.
     pub signals: &'a [S],
@@ -100,10 +100,32 @@ pub struct Reading<'a, S> {
     pub past: &'a dyn Past<S>,
 }
 
-impl<S: Real> Reading<'_, S> {
-    /// The signal that plays `role` at this channel.
+impl<'a, S: Real> Reading<'a, S> {
+    /// A reading in which everything is zero, and nothing has a past.
+    pub fn nothing() -> Self {
+        Self {
+            time: 0.0,
+            from: 0.0,
+            to: 0.0,
+            nominal: S::zero(),
+            side: S::zero(),
+            is_position: false,
+            roles: [None; Role::COUNT],
+            signals: &[],
+            past: &NoPast,
+        }
+    }
+
+    /// The same with the signal that plays `role`.
+    pub fn with(mut self, role: Role, signal: &'a S) -> Self {
+        self.roles[role as usize] = Some(signal);
+        self
+    }
+
+    /// The signal that plays `role` at this channel; zero where the effect does not declare that.
+    #[inline(always)]
     pub fn get(&self, role: Role) -> S {
-        self.roles[role as usize]
+        self.roles[role as usize].copied().unwrap_or_else(S::zero)
     }
 }
 

@@ -84,22 +84,22 @@ impl<B: Clone> Rk4<B> {
         f(0, x, rate);
         for i in 0..n {
             sum[i] = rate[i];
-            stage[i] = x[i] + half * rate[i];
+            stage[i] = x[i] + rate[i].times(half);
         }
         f(1, stage, rate);
         for i in 0..n {
-            sum[i] += two * rate[i];
-            stage[i] = x[i] + half * rate[i];
+            sum[i] += rate[i].times(two);
+            stage[i] = x[i] + rate[i].times(half);
         }
         f(2, stage, rate);
         for i in 0..n {
-            sum[i] += two * rate[i];
-            stage[i] = x[i] + h * rate[i];
+            sum[i] += rate[i].times(two);
+            stage[i] = x[i] + rate[i].times(h);
         }
         f(3, stage, rate);
         let sixth = h * S::of(1.0 / 6.0);
         for i in 0..n {
-            x[i] += sixth * (sum[i] + rate[i]);
+            x[i] += (sum[i] + rate[i]).times(sixth);
         }
     }
 }
@@ -120,7 +120,7 @@ pub fn rk4_step<S: Real, const N: usize>(x: &mut [S; N], h: S, f: impl Fn(&[S; N
     let half = h * S::of(0.5);
     let two = S::of(2.0);
     let along = |x: &[S; N], rate: &[S; N], h: S| -> [S; N] {
-        core::array::from_fn(|i| x[i] + h * rate[i])
+        core::array::from_fn(|i| x[i] + rate[i].times(h))
     };
     let k1 = f(x);
     let k2 = f(&along(x, &k1, half));
@@ -128,7 +128,7 @@ pub fn rk4_step<S: Real, const N: usize>(x: &mut [S; N], h: S, f: impl Fn(&[S; N
     let k4 = f(&along(x, &k3, h));
     let sixth = h * S::of(1.0 / 6.0);
     for i in 0..N {
-        x[i] += sixth * (k1[i] + two * k2[i] + two * k3[i] + k4[i]);
+        x[i] += (k1[i] + k2[i].times(two) + k3[i].times(two) + k4[i]).times(sixth);
     }
 }
 

@@ -57,6 +57,12 @@ pub trait Real:
     /// `self^exponent`; NaN below zero, unless the exponent is a whole number.
     fn powf(self, exponent: Self) -> Self;
 
+    /// The product with a constant, whose derivatives are taken for zero: for a dual number half the work
+    /// of a multiplication.
+    fn times(self, constant: Self) -> Self {
+        self * constant
+    }
+
     /// Absolute value.
     fn abs(self) -> Self {
         if self < Self::zero() { -self } else { self }

@@ -93,7 +93,7 @@ impl Positions {
                 for (state, row) in rows {
                     for ((y, p), gain) in run.sample(k).iter().zip(&predicted).zip(row) {
                         if y.is_finite() {
-                            let step = (S::of(*y) - *p) * S::of(gain * factor);
+                            let step = (S::of(*y) - *p).times(S::of(gain * factor));
                             simulator.state_mut()[*state] += step;
                         }
                     }

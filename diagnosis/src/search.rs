@@ -17,6 +17,10 @@ use crate::trial::{Judged, finish, look, promise};
 
 /// Candidates that are fitted to the end.
 const FINALISTS: usize = 9;
+/// Those among them that leave no more than so many times what the best leaves at a first look; of the
+/// others there are only as many as make up the second number.
+const FAR: f64 = 2.0;
+const IN_ANY_CASE: usize = 4;
 /// Starts of candidates that promise most and are looked at.
 const LOOKED_AT: usize = 36;
 /// Starts of one candidate that are looked at.
@@ -28,6 +32,8 @@ const GROWN: usize = 3;
 /// A simpler candidate that leaves more than so many times the least that was seen is not grown: what it
 /// leaves is not what the larger one adds.
 const WORTH_GROWING: f64 = 2.0;
+/// An effect that leaves so many times what it leaves at another place is there, not here.
+const ELSEWHERE: f64 = 1.1;
 /// An effect at several channels alike is tried at each with its own parameters where it leaves less
 /// than this share of the error.
 const WORTH_DIVIDING: f64 = 0.8;
@@ -73,8 +79,7 @@ impl Search<'_> {
         // only where that one led nowhere.
         let mut waiting = larger;
         loop {
-            let mut next = self.grown(&looked, duration);
-            waiting.retain(|(i, _)| !next.iter().any(|(j, _)| i == j));
+            let mut next = self.grown(&looked, &mut waiting, duration);
             next.append(&mut waiting);
             if next.is_empty() {
                 break;
@@ -138,26 +143,45 @@ impl Search<'_> {
         (contains || divides) && candidate.at == other.at && !other.separate
     }
 
-    /// Attempts at candidates that were not looked at yet, from where simpler ones ended.
-    fn grown(&self, looked: &[(usize, Judged)], duration: f64) -> Vec<Attempt> {
+    /// Attempts at candidates that were not looked at yet, from where simpler ones ended; those no longer
+    /// wait.
+    fn grown(
+        &self,
+        looked: &[(usize, Judged)],
+        waiting: &mut Vec<Attempt>,
+        duration: f64,
+    ) -> Vec<Attempt> {
         let error = |found: &Judged| nrmse(&found.rank);
-        let least = (looked.iter().map(|(_, found)| error(found))).fold(f64::INFINITY, f64::min);
-        let new = (0..self.all.len()).filter(|i| looked.iter().all(|(j, _)| i != j));
-        new.filter_map(|i| {
-            let candidate = &self.all[i];
-            let worth = |found: &Judged| {
-                let divided = error(found) < WORTH_DIVIDING * nrmse(self.rank);
-                error(found) < WORTH_GROWING * least && (!candidate.separate || divided)
-            };
+        let least = |errors: &mut dyn Iterator<Item = f64>| errors.fold(f64::INFINITY, f64::min);
+        let least_of_all = least(&mut looked.iter().map(|(_, found)| error(found)));
+        let mut attempts = Vec::new();
+        for (i, candidate) in self.all.iter().enumerate() {
+            if looked.iter().any(|(j, _)| i == *j) {
+                continue;
+            }
             let simpler = looked
                 .iter()
-                .filter(|(j, found)| self.grows(i, *j) && worth(found))
-                .min_by(|a, b| error(&a.1).total_cmp(&error(&b.1)));
-            let starts = grown_starts(candidate, &simpler?.1, duration);
-            (starts.len() <= GROWN).then(|| starts.into_iter().map(move |start| (i, start)))
-        })
-        .flatten()
-        .collect()
+                .filter(|(j, _)| self.grows(i, *j))
+                .map(|(_, found)| found)
+                .min_by(|a, b| error(a).total_cmp(&error(b)));
+            let Some(simpler) = simpler else { continue };
+            let same = |found: &Judged| found.candidate.meta.id == simpler.candidate.meta.id;
+            let places = looked.iter().filter(|(_, found)| same(found));
+            let elsewhere =
+                error(simpler) > ELSEWHERE * least(&mut places.map(|(_, found)| error(found)));
+            let divided = error(simpler) < WORTH_DIVIDING * nrmse(self.rank);
+            let starts = grown_starts(candidate, simpler, duration);
+            let worth = error(simpler) < WORTH_GROWING * least_of_all
+                && (!candidate.separate || divided)
+                && starts.len() <= GROWN;
+            if elsewhere || worth {
+                waiting.retain(|(j, _)| i != *j);
+            }
+            if worth && !elsewhere {
+                attempts.extend(starts.into_iter().map(|start| (i, start)));
+            }
+        }
+        attempts
     }
 }
 
@@ -174,8 +198,16 @@ fn contest(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
             nrmse(&other.rank) < CLOSE * nrmse(&found.rank)
                 && spares(&other.candidate, &found.candidate)
         });
-        let siblings = finalists.iter().filter(|j| j.candidate.meta.id == id);
-        if !again && !needless && siblings.count() < SIBLINGS && finalists.len() < FINALISTS {
+        let siblings: Vec<&Judged> = (finalists.iter())
+            .filter(|j| j.candidate.meta.id == id)
+            .collect();
+        let elsewhere = (siblings.first())
+            .is_some_and(|best| nrmse(&found.rank) > ELSEWHERE * nrmse(&best.rank));
+        let far =
+            (finalists.first()).is_some_and(|best| nrmse(&found.rank) > FAR * nrmse(&best.rank));
+        let places = if far { IN_ANY_CASE } else { FINALISTS };
+        let crowded = siblings.len() >= SIBLINGS || finalists.len() >= places;
+        if !again && !needless && !elsewhere && !crowded {
             finalists.push(found.clone());
         }
     }

@@ -1,6 +1,6 @@
 //! The effects that a robot can compensate, by their identifiers.
 
-use loopsight_core::{Effect, EffectMeta, NoPast, Physics, Reading, Real, Role};
+use loopsight_core::{Effect, EffectMeta, Physics, Reading, Real};
 use loopsight_link::PARAMETERS;
 use loopsight_plants::effects::{
     ConstantForce, CoulombFriction, DirectionalFriction, QuadraticDrag, ScrubFriction,
@@ -44,21 +44,20 @@ macro_rules! aboard {
             ) -> S {
                 match self {
                     $(Known::$effect => {
-                        let mut reading = Reading {
-                            time: 0.0,
-                            from: 0.0,
-                            to: 0.0,
+                        let meta = &$effect::META;
+                        let read: [S; READS] = core::array::from_fn(|k| match meta.reads.get(k) {
+                            Some(_) => signal(k),
+                            None => S::zero(),
+                        });
+                        let nothing = Reading {
                             nominal,
                             side,
-                            is_position: false,
-                            roles: [S::zero(); Role::COUNT],
-                            signals: &[],
-                            past: &NoPast,
+                            ..Reading::nothing()
                         };
-                        for (k, role) in $effect::META.reads.iter().enumerate() {
-                            reading.roles[*role as usize] = signal(k);
-                        }
-                        let p = &p[..$effect::META.parameters.len()];
+                        let reads = meta.reads.iter().zip(&read);
+                        let reading =
+                            reads.fold(nothing, |at, (role, signal)| at.with(*role, signal));
+                        let p = &p[..meta.parameters.len()];
                         Physics::contribution(&$effect, &reading, &[], p)
                     })+
                 }

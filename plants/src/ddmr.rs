@@ -192,8 +192,8 @@ fn armature<S: Real>(x: &[S; 6], u: &[S; 2], p: &[S; 8]) -> [S; 2] {
     let [v, omega, ..] = *x;
     let [k_a, _, k_c, k_d, _, k_f, ..] = *p;
     let half = S::of(0.5);
-    let forward = half * quotient(k_a, k_c) * v;
-    let turning = half * quotient(k_d, k_f) * omega;
+    let forward = (quotient(k_a, k_c) * v).times(half);
+    let turning = (quotient(k_d, k_f) * omega).times(half);
     [u[0] + forward + turning, u[1] + forward - turning]
 }
 

@@ -53,7 +53,7 @@ macro_rules! physics {
                 p: &[$scalar],
             ) -> $scalar {
                 let here = [at.nominal, at.side, <$scalar>::of(at.time)];
-                self.force.value(&[p, &at.roles, at.signals, &here])
+                self.force.value(&[p, &Role::ALL.map(|r| at.get(r)), at.signals, &here])
             }
             fn state_derivative(
                 &self,

@@ -136,12 +136,6 @@ impl<S: HostReal> Scene<'_, S> {
     }
 
     fn reading<'p>(&'p self, bound: &Bound, nominal: S, past: &'p dyn Past<S>) -> Reading<'p, S> {
-        let mut roles = [S::zero(); Role::COUNT];
-        for (role, read) in roles.iter_mut().zip(&bound.reads) {
-            if let Some(index) = read {
-                *role = self.signals[*index];
-            }
-        }
         Reading {
             time: self.time,
             from: self.interval.0,
@@ -149,7 +143,7 @@ impl<S: HostReal> Scene<'_, S> {
             nominal,
             side: S::of(bound.side),
             is_position: bound.is_position,
-            roles,
+            roles: bound.reads.map(|read| self.signals.get(read?)),
             signals: self.signals,
             past,
         }

@@ -56,24 +56,10 @@ declare_effect!(NorrbinDamping, "norrbin_damping", <1, 0>);
 
 #[cfg(test)]
 mod tests {
-    use loopsight_core::NoPast;
-
     use super::*;
 
     fn at_rate(flow: f64) -> f64 {
-        let mut roles = [0.0; Role::COUNT];
-        roles[Role::Flow as usize] = flow;
-        let reading = Reading {
-            time: 0.0,
-            from: 0.0,
-            to: 0.0,
-            nominal: 0.0,
-            side: 0.0,
-            is_position: false,
-            roles,
-            signals: &[],
-            past: &NoPast,
-        };
+        let reading = Reading::nothing().with(Role::Flow, &flow);
         NorrbinDamping::contribution(&reading, &[], &[4.0])
     }
 

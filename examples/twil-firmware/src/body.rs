@@ -1,6 +1,6 @@
 //! A Twil with dry bearings, simulated on the board: motors and encoders where there are none.
 
-use loopsight_core::{NoPast, Physics, Plant, Reading, Role, rk4_step};
+use loopsight_core::{Physics, Plant, Reading, Role, rk4_step};
 use loopsight_onboard::Sensors;
 use loopsight_plants::Ddmr;
 use loopsight_plants::effects::CoulombFriction;
@@ -66,18 +66,6 @@ impl Body {
 
 /// Friction at a wheel that turns at `flow`, rad/s; in V.
 fn rubbing(flow: f32) -> f32 {
-    let mut roles = [0.0; Role::COUNT];
-    roles[Role::Flow as usize] = flow;
-    let reading = Reading {
-        time: 0.0,
-        from: 0.0,
-        to: 0.0,
-        nominal: 0.0,
-        side: 0.0,
-        is_position: false,
-        roles,
-        signals: &[],
-        past: &NoPast,
-    };
+    let reading = Reading::nothing().with(Role::Flow, &flow);
     CoulombFriction.contribution(&reading, &[], &FRICTION)
 }

@@ -7,7 +7,7 @@
 )]
 
 use heapless::Vec;
-use loopsight_core::{NoPast, Physics, Plant, Reading, Role, rk4_step};
+use loopsight_core::{Physics, Plant, Reading, Role, rk4_step};
 use loopsight_link::*;
 use loopsight_onboard::Twil;
 use loopsight_plants::Ddmr;
@@ -127,19 +127,7 @@ impl Body {
 
 /// Friction at a wheel that turns at `flow`, rad/s; in V.
 fn rubbing(flow: f64, friction: &[f64; 2]) -> f64 {
-    let mut roles = [0.0; Role::COUNT];
-    roles[Role::Flow as usize] = flow;
-    let reading = Reading {
-        time: 0.0,
-        from: 0.0,
-        to: 0.0,
-        nominal: 0.0,
-        side: 0.0,
-        is_position: false,
-        roles,
-        signals: &[],
-        past: &NoPast,
-    };
+    let reading = Reading::nothing().with(Role::Flow, &flow);
     CoulombFriction.contribution(&reading, &[], friction)
 }
 

@@ -120,7 +120,7 @@ impl Effect<3, 4> for Backlash {
         let armature = at.get(Role::Armature);
         let emf = at.get(Role::Drive) - armature;
         let wound = armature / stiffness;
-        let half = play * S::of(0.5);
+        let half = play.times(S::of(0.5));
         let beyond = if wound > S::zero() {
             wound + half
         } else if wound < S::zero() {
@@ -136,7 +136,7 @@ declare_effect!(Backlash, "backlash", <3, 4>);
 
 /// `z` beyond the gap, zero within; by the play it has its derivative at zero too.
 fn engaged<S: Real>(z: S, play: S) -> S {
-    let half = play * S::of(0.5);
+    let half = play.times(S::of(0.5));
     z - z.held(-half, half)
 }
 

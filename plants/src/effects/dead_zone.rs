@@ -57,7 +57,7 @@ mod tests {
 
     use super::*;
 
-    use loopsight_core::{derivative, variable};
+    use loopsight_core::{Dual, derivative, variable};
 
     #[test]
     fn takes_the_threshold_and_no_more() {
@@ -76,7 +76,10 @@ mod tests {
     #[test]
     fn a_fit_can_leave_a_threshold_of_zero() {
         for u in [3.0, -3.0] {
-            let at = dual_reading(u);
+            let at = Reading {
+                nominal: Dual::of(u),
+                ..Reading::nothing()
+            };
             let w = DeadZone::contribution(&at, &[], &[variable(0.0, 0)]);
             assert_eq!(w.value(), 0.0);
             assert_eq!(derivative(&w, 0), -f64::signum(u));

@@ -1,39 +1,12 @@
 //! What the tests of effects share.
 
-use loopsight_core::{Dual, NoPast, Past, Reading, Real, Role};
+use loopsight_core::{Past, Reading, Role};
 
-/// A reading at rest, with the signals that are given.
+/// A reading at rest, with the signals that are given, which live on to the end of the test.
 pub(super) fn reading(roles: &[(Role, f64)]) -> Reading<'static, f64> {
-    let mut at = Reading {
-        time: 0.0,
-        from: 0.0,
-        to: 0.0,
-        nominal: 0.0,
-        side: 0.0,
-        is_position: false,
-        roles: [0.0; Role::COUNT],
-        signals: &[],
-        past: &NoPast,
-    };
-    for (role, value) in roles {
-        at.roles[*role as usize] = *value;
-    }
-    at
-}
-
-/// A reading for a dual number with this nominal value.
-pub(super) fn dual_reading(nominal: f64) -> Reading<'static, Dual> {
-    Reading {
-        time: 0.0,
-        from: 0.0,
-        to: 0.0,
-        nominal: Dual::of(nominal),
-        side: Dual::of(0.0),
-        is_position: false,
-        roles: [Dual::of(0.0); Role::COUNT],
-        signals: &[],
-        past: &NoPast,
-    }
+    let signals: &'static [(Role, f64)] = roles.to_vec().leak();
+    let at = Reading::nothing();
+    (signals.iter()).fold(at, |at, (role, value)| at.with(*role, value))
 }
 
 /// A signal that is the time.

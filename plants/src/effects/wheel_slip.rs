@@ -137,7 +137,7 @@ fn over_ground<S: Real>(at: &Reading<'_, S>) -> S {
 
 /// The rate of that.
 fn acceleration<S: Real>(at: &Reading<'_, S>, z: &[S; 2]) -> S {
-    S::of(FILTER) * (over_ground(at) - z[1])
+    (over_ground(at) - z[1]).times(S::of(FILTER))
 }
 
 /// The force that a wheel that rolls would need.
@@ -149,7 +149,7 @@ fn needed<S: Real>(at: &Reading<'_, S>, z: &[S; 2], p: &[S; 4]) -> S {
 fn taken<S: Real>(needed: S, s: S, p: &[S; 4]) -> S {
     let [limit, wheel, sliding, fall] = *p;
     let most = limit * (sliding + (S::one() - sliding) / (S::one() + s.abs() / fall));
-    (needed + (S::of(GRIP) * wheel - S::one()) * s).held(-most, most)
+    (needed + (wheel.times(S::of(GRIP)) - S::one()) * s).held(-most, most)
 }
 
 #[cfg(test)]
