@@ -165,7 +165,9 @@ impl Search<'_> {
                 .map(|(_, found)| found)
                 .min_by(|a, b| error(a).total_cmp(&error(b)));
             let Some(simpler) = simpler else { continue };
-            let same = |found: &Judged| found.candidate.meta.id == simpler.candidate.meta.id;
+            let same = |found: &Judged| {
+                found.candidate.meta.id == simpler.candidate.meta.id && !found.candidate.separate
+            };
             let places = looked.iter().filter(|(_, found)| same(found));
             let elsewhere =
                 error(simpler) > ELSEWHERE * least(&mut places.map(|(_, found)| error(found)));
@@ -201,8 +203,10 @@ fn contest(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
         let siblings: Vec<&Judged> = (finalists.iter())
             .filter(|j| j.candidate.meta.id == id)
             .collect();
-        let elsewhere = (siblings.first())
-            .is_some_and(|best| nrmse(&found.rank) > ELSEWHERE * nrmse(&best.rank));
+        let elsewhere = siblings.first().is_some_and(|best| {
+            best.candidate.at != found.candidate.at
+                && nrmse(&found.rank) > ELSEWHERE * nrmse(&best.rank)
+        });
         let far =
             (finalists.first()).is_some_and(|best| nrmse(&found.rank) > FAR * nrmse(&best.rank));
         let places = if far { IN_ANY_CASE } else { FINALISTS };
