@@ -1,5 +1,6 @@
 //! Which candidates are looked at, and which of them are fitted to the end.
 
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use loopsight_core::model::Model;
@@ -17,9 +18,10 @@ use crate::trial::{Judged, finish, look, promise};
 
 /// Candidates that are fitted to the end.
 const FINALISTS: usize = 9;
-/// Those among them that leave no more than so many times what the best leaves at a first look; of the
-/// others there are only as many as make up the second number.
+/// What leaves more than so many times what the best leaves at a first look is among them only while there
+/// are fewer than [`IN_ANY_CASE`].
 const FAR: f64 = 2.0;
+/// See [`FAR`].
 const IN_ANY_CASE: usize = 4;
 /// Starts of candidates that promise most and are looked at.
 const LOOKED_AT: usize = 36;
@@ -68,22 +70,24 @@ impl Search<'_> {
             })
             .collect();
         let (done, total) = (AtomicU64::new(0), (attempts.len() + LOOKED_AT) as u64);
-        let tick = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+        let tick = || progress(total.min(done.fetch_add(1, Ordering::Relaxed) + 1), total);
 
         let promising = self.promising(attempts, &tick);
         let simple = |i: usize| !promising.iter().any(|(j, _)| self.grows(i, *j));
         let (first, larger): (Vec<Attempt>, Vec<Attempt>) =
             promising.iter().cloned().partition(|(i, _)| simple(*i));
+        let mut tried: BTreeSet<usize> = first.iter().map(|(i, _)| *i).collect();
         let mut looked = self.looks(&first, &tick);
         // What contains another candidate is looked at after it, from where that one ended; as it promised
         // only where that one led nowhere.
         let mut waiting = larger;
         loop {
-            let mut next = self.grown(&looked, &mut waiting, duration);
+            let mut next = self.grown(&looked, &tried, &mut waiting, duration);
             next.append(&mut waiting);
             if next.is_empty() {
                 break;
             }
+            tried.extend(next.iter().map(|(i, _)| *i));
             looked.extend(self.looks(&next, &tick));
         }
         let mut finalists: Vec<(Judged, Fit)> = contest(looked)
@@ -143,11 +147,11 @@ impl Search<'_> {
         (contains || divides) && candidate.at == other.at && !other.separate
     }
 
-    /// Attempts at candidates that were not looked at yet, from where simpler ones ended; those no longer
-    /// wait.
+    /// Attempts at candidates that were not tried yet, from where simpler ones ended; those no longer wait.
     fn grown(
         &self,
         looked: &[(usize, Judged)],
+        tried: &BTreeSet<usize>,
         waiting: &mut Vec<Attempt>,
         duration: f64,
     ) -> Vec<Attempt> {
@@ -156,12 +160,9 @@ impl Search<'_> {
         let least_of_all = least(&mut looked.iter().map(|(_, found)| error(found)));
         let mut attempts = Vec::new();
         for (i, candidate) in self.all.iter().enumerate() {
-            if looked.iter().any(|(j, _)| i == *j) {
-                continue;
-            }
             let simpler = looked
                 .iter()
-                .filter(|(j, _)| self.grows(i, *j))
+                .filter(|(j, _)| !tried.contains(&i) && self.grows(i, *j))
                 .map(|(_, found)| found)
                 .min_by(|a, b| error(a).total_cmp(&error(b)));
             let Some(simpler) = simpler else { continue };
@@ -207,8 +208,8 @@ fn contest(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
             best.candidate.at != found.candidate.at
                 && nrmse(&found.rank) > ELSEWHERE * nrmse(&best.rank)
         });
-        let far =
-            (finalists.first()).is_some_and(|best| nrmse(&found.rank) > FAR * nrmse(&best.rank));
+        let best = finalists.first();
+        let far = best.is_some_and(|best| nrmse(&found.rank) > FAR * nrmse(&best.rank));
         let places = if far { IN_ANY_CASE } else { FINALISTS };
         let crowded = siblings.len() >= SIBLINGS || finalists.len() >= places;
         if !again && !needless && !elsewhere && !crowded {
