@@ -30,7 +30,7 @@ const REPORTED: usize = 12;
 /// are about a hundred candidates: a chance of 1e-4 each is one of 1 % for all.
 const BEATS: f64 = 3.7;
 /// It must be so many standard errors from doing nothing.
-const SIGNIFICANT: f64 = 4.0;
+pub(crate) const SIGNIFICANT: f64 = 4.0;
 /// With so many it need not shine on unseen data, only leave no more there than the plain model: an
 /// effect that shows in transients alone leaves few samples to be judged by.
 const CERTAIN: f64 = 5.0;

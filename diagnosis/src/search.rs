@@ -20,7 +20,7 @@ use crate::trial::{Judged, finish, look, promise};
 const FINALISTS: usize = 9;
 /// What leaves more than so many times what the best leaves at a first look is among them only while there
 /// are fewer than [`IN_ANY_CASE`].
-const FAR: f64 = 2.0;
+const FAR: f64 = 3.0;
 /// See [`FAR`].
 const IN_ANY_CASE: usize = 4;
 /// Starts of candidates that promise most and are looked at.
@@ -140,11 +140,11 @@ impl Search<'_> {
     /// found from dry friction, not from none, and two levels from one for both.
     fn grows(&self, i: usize, from: usize) -> bool {
         let (candidate, other) = (&self.all[i], &self.all[from]);
-        let contains = candidate.meta.simpler.contains(&other.meta.id)
-            && !candidate.separate
-            && candidate.replaces.is_none();
-        let divides = candidate.separate && candidate.meta.id == other.meta.id;
-        (contains || divides) && candidate.at == other.at && !other.separate
+        let contains =
+            is_special(other, candidate) && !candidate.separate && candidate.replaces.is_none();
+        let divides =
+            candidate.separate && candidate.meta.id == other.meta.id && candidate.at == other.at;
+        (contains || divides) && !other.separate
     }
 
     /// Attempts at candidates that were not tried yet, from where simpler ones ended; those no longer wait.
@@ -208,8 +208,11 @@ fn contest(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
             best.candidate.at != found.candidate.at
                 && nrmse(&found.rank) > ELSEWHERE * nrmse(&best.rank)
         });
-        let best = finalists.first();
-        let far = best.is_some_and(|best| nrmse(&found.rank) > FAR * nrmse(&best.rank));
+        // A special case of one that did well may only not have come to its end.
+        let special = |j: &Judged| is_special(&found.candidate, &j.candidate);
+        let far = (finalists.first())
+            .is_some_and(|best| nrmse(&found.rank) > FAR * nrmse(&best.rank))
+            && !finalists.iter().any(special);
         let places = if far { IN_ANY_CASE } else { FINALISTS };
         let crowded = siblings.len() >= SIBLINGS || finalists.len() >= places;
         if !again && !needless && !elsewhere && !crowded {
@@ -223,10 +226,14 @@ fn contest(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
 /// alike at all channels, or at more of them (on a straight run one wheel stands for both: then both).
 fn spares(other: &Candidate, candidate: &Candidate) -> bool {
     let same = other.meta.id == candidate.meta.id && !other.separate;
-    let special = candidate.meta.simpler.contains(&other.meta.id) && candidate.at == other.at;
     let alike = same && candidate.separate && other.at == candidate.at;
     let wider = same
         && candidate.at.iter().all(|c| other.at.contains(c))
         && other.at.len() > candidate.at.len();
-    special || alike || wider
+    is_special(other, candidate) || alike || wider
+}
+
+/// Whether a candidate is contained in another one at its place.
+fn is_special(candidate: &Candidate, of: &Candidate) -> bool {
+    of.meta.simpler.contains(&candidate.meta.id) && of.at == candidate.at
 }

@@ -3,9 +3,10 @@
 use loopsight_core::model::Model;
 
 use crate::candidates::Candidate;
+use crate::diagnose::SIGNIFICANT;
 use crate::fit::Fit;
 use crate::holdout::{Holdout, Judgement};
-use crate::judge::{Losses, nrmse};
+use crate::judge::{Losses, nrmse, significance};
 use crate::positions::Positions;
 use crate::problem::{Effort, Problem, Solution};
 
@@ -162,12 +163,18 @@ pub(crate) fn finish(
     let broad = fully(first, holdout, nominal, f64::INFINITY);
     let error = |found: &(Judged, Fit)| nrmse(&found.0.rank);
     let of = |found: &Option<(Judged, Fit)>| found.as_ref().map_or(f64::INFINITY, error);
-    let soft =
-        (of(&broad) < of(&sharp)).then(|| softer(broad.as_ref()?.0.clone(), holdout, nominal));
+    // A width is one more thing to be found: it must be there beyond doubt.
+    let soft = broad
+        .as_ref()
+        .filter(|_| of(&broad) < of(&sharp))
+        .and_then(|(judged, _)| {
+            let soft = softer(judged.clone(), holdout, nominal)?;
+            (significance(&judged.rank, &soft.0.rank) > SIGNIFICANT).then_some(soft)
+        });
     sharp
         .into_iter()
         .chain(broad)
-        .chain(soft.flatten())
+        .chain(soft)
         .min_by(|a, b| error(a).total_cmp(&error(b)))
 }
 
