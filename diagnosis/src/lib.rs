@@ -30,6 +30,7 @@ mod rls;
 mod rounding;
 mod score;
 mod search;
+mod solve;
 mod starts;
 mod stride;
 mod sufficiency;

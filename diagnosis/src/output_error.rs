@@ -15,8 +15,9 @@ use crate::flatness::Flatness;
 use crate::noise;
 use crate::observer::{growth, hold_with};
 use crate::prediction::InitialStates;
-use crate::problem::{Effort, Problem, declared};
+use crate::problem::{Problem, declared};
 use crate::regression::batch;
+use crate::solve::Effort;
 
 /// Fits the free parameters and the initial states of all runs.
 ///

@@ -1,12 +1,7 @@
-//! The least-squares problem of a fit to the free run, and its solution.
+//! The least-squares problem of a fit to the free run.
 
 use std::cell::{Cell, RefCell};
-use std::convert::Infallible;
 
-use basin::{
-    BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet, Constraints,
-    Executor, Jacobian, Residual,
-};
 use loopsight_core::model::Model;
 use loopsight_core::run::Run;
 use nalgebra::{DMatrix, DVector};
@@ -30,7 +25,7 @@ type Linearised = (DVector<f64>, DVector<f64>, DMatrix<f64>);
 pub(crate) struct Problem<'a> {
     pub(crate) model: &'a Model,
     pub(crate) runs: &'a [Run],
-    progress: &'a (dyn Fn(u64, f64) + Sync),
+    pub(crate) progress: &'a (dyn Fn(u64, f64) + Sync),
     /// Indices of the estimated parameters.
     pub(crate) free: Vec<usize>,
     /// Plant states whose initial values are estimated.
@@ -52,23 +47,6 @@ pub(crate) struct Problem<'a> {
     held: Option<Vec<DVector<f64>>>,
     /// The positions are as measured, not simulated.
     pub(crate) positions: Option<Positions>,
-}
-
-/// How hard a fit tries.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Effort {
-    /// Most iterations.
-    pub(crate) iterations: u64,
-    /// Relative change of the cost at which it is done.
-    pub(crate) tolerance: f64,
-}
-
-impl Effort {
-    /// To far below the standard errors.
-    pub(crate) const FULL: Self = Self {
-        iterations: 100,
-        tolerance: 1e-9,
-    };
 }
 
 /// What a fit found.
@@ -221,27 +199,6 @@ impl<'a> Problem<'a> {
         DVector::from_vec(scaled)
     }
 
-    /// Solves from `values` and `states`.
-    pub(crate) fn solve_from(
-        &mut self,
-        values: &[f64],
-        states: &[DVector<f64>],
-        effort: Effort,
-    ) -> Result<Solution, FitError> {
-        let start = self.pack(values, states);
-        let start = self.balance(start);
-        self.finish(&start, effort)
-    }
-
-    /// Solves from scaled unknowns.
-    pub(crate) fn finish(
-        &self,
-        start: &DVector<f64>,
-        effort: Effort,
-    ) -> Result<Solution, FitError> {
-        Ok(self.solution(&self.solve(start, effort)?))
-    }
-
     /// What scaled unknowns stand for.
     pub(crate) fn solution(&self, scaled: &DVector<f64>) -> Solution {
         let (values, states) = self.unpack(scaled);
@@ -362,32 +319,6 @@ impl<'a> Problem<'a> {
         (all, jacobian)
     }
 
-    pub(crate) fn solve(
-        &self,
-        start: &DVector<f64>,
-        effort: Effort,
-    ) -> Result<DVector<f64>, FitError> {
-        let solver = BoundedLevenbergMarquardt::<DVector<f64>, DMatrix<f64>>::new()
-            .with_absolute_scaled_gradient_tolerance(1e-14)
-            .with_tau(1e-6)
-            .with_relative_cost_change_tolerance(effort.tolerance)
-            .with_relative_step_tolerance(1e-10);
-        let result = Executor::from_start(Borrowed(self), solver, start.clone())
-            .max_iter(effort.iterations)
-            .run();
-        let result = match result {
-            Ok(result) => result,
-            Err(error) => return Err(FitError::Solver(error.to_string())),
-        };
-        let solution = result.param().clone();
-        if solution.iter().any(|v| !v.is_finite()) {
-            return Err(FitError::Solver(
-                "the parameters left the finite numbers".to_owned(),
-            ));
-        }
-        Ok(solution)
-    }
-
     /// The estimated parameters, for what is said of flat directions.
     pub(crate) fn named(&self) -> Vec<Named<'_>> {
         self.free
@@ -449,40 +380,4 @@ pub(crate) fn declared(model: &Model) -> Vec<f64> {
         .iter()
         .map(|p| p.value.unwrap_or_else(|| p.declaration.nearest(p.scale())))
         .collect()
-}
-
-/// The problem as the solver sees it.
-struct Borrowed<'p, 'a>(&'p Problem<'a>);
-
-impl Residual for Borrowed<'_, '_> {
-    type Param = DVector<f64>;
-    type Output = DVector<f64>;
-    type Error = Infallible;
-    fn residual(&self, scaled: &DVector<f64>) -> Result<DVector<f64>, Infallible> {
-        Ok(self.0.residual_vector(scaled))
-    }
-}
-
-impl Jacobian for Borrowed<'_, '_> {
-    type Jacobian = DMatrix<f64>;
-    fn jacobian(&self, scaled: &DVector<f64>) -> Result<DMatrix<f64>, Infallible> {
-        Ok(self.residual_and_jacobian(scaled)?.1)
-    }
-    /// The simulation that differentiates predicts as well.
-    fn residual_and_jacobian(
-        &self,
-        scaled: &DVector<f64>,
-    ) -> Result<(DVector<f64>, DMatrix<f64>), Infallible> {
-        let (residual, jacobian) = self.0.linearise(scaled);
-        self.0.evaluations.set(self.0.evaluations.get() + 1);
-        (self.0.progress)(self.0.evaluations.get(), residual.norm());
-        Ok((residual, jacobian))
-    }
-}
-
-impl Constraints for Borrowed<'_, '_> {
-    type Set = ConstraintSet<BoxBounds<DVector<f64>>>;
-    fn constraints(&self) -> <Self::Set as ConstraintDescription>::Borrowed<'_> {
-        ConstraintSet::new().with_bounds(BoxBounds::new(Some(&self.0.lower), Some(&self.0.upper)))
-    }
 }

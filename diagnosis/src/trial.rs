@@ -8,7 +8,8 @@ use crate::fit::Fit;
 use crate::holdout::{Holdout, Judgement};
 use crate::judge::{Losses, nrmse, significance};
 use crate::positions::Positions;
-use crate::problem::{Effort, Problem, Solution};
+use crate::problem::{Problem, Solution};
+use crate::solve::Effort;
 
 /// Effort of a first look at a candidate.
 const LOOK: Effort = Effort {
