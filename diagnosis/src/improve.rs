@@ -107,14 +107,7 @@ pub fn improve(
             nrmse_fit: best.nrmse_fit,
             nrmse_test: best.nrmse,
         });
-        present = refine(
-            best.model,
-            &mut steps,
-            &diagnoses[..round],
-            runs,
-            test,
-            faults,
-        )?;
+        present = refine(best.model, &mut steps, &diagnoses[..round], runs, test)?;
     };
     let best = match verdict {
         Conclusion::LogFaulty | Conclusion::DataInsufficient => None,

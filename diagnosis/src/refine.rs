@@ -2,14 +2,15 @@
 
 use loopsight_core::model::{Attached, Model};
 use loopsight_core::run::Run;
-use loopsight_recordings::Fault;
 use rayon::prelude::*;
 
 use crate::candidates::{is_width, smooth};
+use crate::compare::compare;
 use crate::conclusion::{Diagnosis, Place};
 use crate::diagnose::CLOSE;
-use crate::fit::{FitError, FitSettings, fit};
+use crate::fit::{FitError, FitSettings};
 use crate::improve::Step;
+use crate::output_error;
 
 /// The model to go on from after the last of `steps`, fitted: what the last one made needless goes, and
 /// its step with it; simpler effects and others that the data could not tell from those of earlier
@@ -21,9 +22,13 @@ pub(crate) fn refine(
     diagnoses: &[Diagnosis],
     runs: &[Run],
     test: Option<&[Run]>,
-    faults: &[Fault],
 ) -> Result<Model, FitError> {
-    let mut best = Refined::new(model, runs, test, faults);
+    let mut best = Refined {
+        model,
+        error: None,
+        runs,
+        test,
+    };
     needless(&mut best, steps)?;
     simplified(&mut best, steps)?;
     reconsidered(&mut best, steps, diagnoses)?;
@@ -133,20 +138,9 @@ struct Refined<'a> {
     error: Option<f64>,
     runs: &'a [Run],
     test: Option<&'a [Run]>,
-    faults: &'a [Fault],
 }
 
-impl<'a> Refined<'a> {
-    fn new(model: Model, runs: &'a [Run], test: Option<&'a [Run]>, faults: &'a [Fault]) -> Self {
-        Self {
-            model,
-            error: None,
-            runs,
-            test,
-            faults,
-        }
-    }
-
+impl Refined<'_> {
     /// The best of `candidates`, each fitted, takes the place where its error is below `share` of the
     /// present one. Those that cannot be fitted (their free run diverges) are none.
     fn takes<T: Send>(
@@ -157,7 +151,7 @@ impl<'a> Refined<'a> {
         if candidates.is_empty() {
             return Ok(None);
         }
-        let refitted = |model: &Model| refitted(model, self.runs, self.test, self.faults);
+        let refitted = |model: &Model| refitted(model, self.runs, self.test);
         let now = match self.error {
             Some(now) => now,
             None => refitted(&self.model)?.0,
@@ -195,18 +189,14 @@ const SIMPLER: f64 = 1.02;
 const BETTER: f64 = 0.9;
 
 /// The error of a model after a short fit, and the fitted model.
-fn refitted(
-    model: &Model,
-    runs: &[Run],
-    test: Option<&[Run]>,
-    faults: &[Fault],
-) -> Result<(f64, Model), FitError> {
+fn refitted(model: &Model, runs: &[Run], test: Option<&[Run]>) -> Result<(f64, Model), FitError> {
     let settings = FitSettings {
         max_iterations: 20,
         ..FitSettings::default()
     };
-    let fitted = fit(model, runs, test, faults, &settings, &|_, _| {})?;
-    Ok((fitted.comparison.nrmse, fitted.model))
+    let fitted = output_error::fit(model, runs, &settings, &|_, _| {})?.model;
+    let error = compare(&fitted, test.unwrap_or(runs), &[])?.nrmse;
+    Ok((error, fitted))
 }
 
 /// How much the error must fall for a sign to be smoothed over half as much.
