@@ -43,31 +43,30 @@ pub(crate) fn choose(
     let not_worse: Vec<usize> = (0..finalists.len())
         .filter(|i| same(*i, 0) || squared(*i) < allowed)
         .collect();
-    let firsts: Vec<usize> = not_worse
-        .iter()
-        .copied()
-        .filter(|i| earned(*i, &explanations[*i]))
+    let earned: Vec<bool> = (0..finalists.len())
+        .map(|i| earned(i, &explanations[i]))
         .collect();
-    let firsts = if firsts.is_empty() {
-        &not_worse
-    } else {
-        &firsts
-    };
+    let none_earned = !not_worse.iter().any(|i| earned[*i]);
+    let may = |i: &usize| earned[*i] || none_earned;
     let complexity = |i: usize| finalists[i].0.candidate.complexity();
     let error = |i: usize| nrmse(&finalists[i].0.rank);
-    let simplest = firsts.iter().map(|i| complexity(*i)).min()?;
-    let simple = || firsts.iter().filter(|i| complexity(**i) == simplest);
-    let leader = *simple().min_by(|a, b| error(**a).total_cmp(&error(**b)))?;
+    let firsts = || not_worse.iter().copied().filter(may);
+    let simplest = firsts().map(complexity).min()?;
+    let leader = firsts()
+        .filter(|i| complexity(*i) == simplest)
+        .min_by(|a, b| error(*a).total_cmp(&error(*b)))?;
     // The common before the rare, and both wheels alike before one wheel: what is built alike fails
-    // alike. But only where the errors do not tell them apart.
-    let chosen = *simple().filter(|i| same(**i, leader)).min_by(|a, b| {
-        let channels = |i: usize| usize::MAX - explanations[i].place.at.len();
-        let rarity = |i: usize| finalists[i].0.candidate.meta.rarity;
-        let key = |i: usize| (rarity(i), channels(i));
-        key(**a)
-            .cmp(&key(**b))
-            .then(error(**a).total_cmp(&error(**b)))
-    })?;
+    // alike. But only where the errors do not tell them apart, those of the leader: how far the best is
+    // ahead of all of them says nothing of that.
+    let alike = (0..finalists.len()).filter(may);
+    let chosen = alike
+        .filter(|i| complexity(*i) == simplest && same(*i, leader))
+        .min_by(|a, b| {
+            let channels = |i: usize| usize::MAX - explanations[i].place.at.len();
+            let rarity = |i: usize| finalists[i].0.candidate.meta.rarity;
+            let key = |i: usize| (rarity(i), channels(i));
+            key(*a).cmp(&key(*b)).then(error(*a).total_cmp(&error(*b)))
+        })?;
     // And another effect that does as well as the chosen one on what no fit saw.
     let unseen = |i: usize| nrmse(&finalists[i].0.losses);
     let id = |i: usize| finalists[i].0.candidate.meta.id;
