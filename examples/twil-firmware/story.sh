@@ -63,7 +63,9 @@ loop live follow.toml ../model.toml -e "s|^duration_s = .*|duration_s = 240.0|"
 "$loopsight" run story/live.toml &
 run=$!
 for _ in $(seq 300); do
-    [ "$(grep -vc '^#' story/live.csv.part 2>/dev/null)" -gt 6000 ] && break
+    # Not there yet in the first moments.
+    ticks=$(grep -vc '^#' story/live.csv.part 2>/dev/null || true)
+    [ "${ticks:-0}" -gt 6000 ] && break
     sleep 0.05
 done
 "$loopsight" send story/after.toml
