@@ -74,13 +74,12 @@ impl Search<'_> {
 
         let promising = self.promising(attempts, &tick);
         let simple = |i: usize| !promising.iter().any(|(j, _)| self.grows(i, *j));
-        let (first, larger): (Vec<Attempt>, Vec<Attempt>) =
+        let (first, mut waiting): (Vec<Attempt>, Vec<Attempt>) =
             promising.iter().cloned().partition(|(i, _)| simple(*i));
         let mut tried: BTreeSet<usize> = first.iter().map(|(i, _)| *i).collect();
         let mut looked = self.looks(&first, &tick);
         // What contains another candidate is looked at after it, from where that one ended; as it promised
         // only where that one led nowhere.
-        let mut waiting = larger;
         loop {
             let mut next = self.grown(&looked, &tried, &mut waiting, duration);
             next.append(&mut waiting);
@@ -94,7 +93,7 @@ impl Search<'_> {
             .into_par_iter()
             .filter_map(|first| finish(first, self.holdout, self.nominal))
             .collect();
-        finalists.sort_by(|a, b| nrmse(&a.0.rank).total_cmp(&nrmse(&b.0.rank)));
+        finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
         finalists
     }
 
@@ -155,26 +154,23 @@ impl Search<'_> {
         waiting: &mut Vec<Attempt>,
         duration: f64,
     ) -> Vec<Attempt> {
-        let error = |found: &Judged| nrmse(&found.rank);
-        let least = |errors: &mut dyn Iterator<Item = f64>| errors.fold(f64::INFINITY, f64::min);
-        let least_of_all = least(&mut looked.iter().map(|(_, found)| error(found)));
+        let least_of_all = least(looked.iter().map(|(_, found)| found));
         let mut attempts = Vec::new();
         for (i, candidate) in self.all.iter().enumerate() {
             let simpler = looked
                 .iter()
                 .filter(|(j, _)| !tried.contains(&i) && self.grows(i, *j))
                 .map(|(_, found)| found)
-                .min_by(|a, b| error(a).total_cmp(&error(b)));
+                .min_by(|a, b| a.error().total_cmp(&b.error()));
             let Some(simpler) = simpler else { continue };
-            let same = |found: &Judged| {
+            let error = simpler.error();
+            let places = looked.iter().map(|(_, found)| found).filter(|found| {
                 found.candidate.meta.id == simpler.candidate.meta.id && !found.candidate.separate
-            };
-            let places = looked.iter().filter(|(_, found)| same(found));
-            let elsewhere =
-                error(simpler) > ELSEWHERE * least(&mut places.map(|(_, found)| error(found)));
-            let divided = error(simpler) < WORTH_DIVIDING * nrmse(self.rank);
+            });
+            let elsewhere = error > ELSEWHERE * least(places);
+            let divided = error < WORTH_DIVIDING * nrmse(self.rank);
             let starts = grown_starts(candidate, simpler, duration);
-            let worth = error(simpler) < WORTH_GROWING * least_of_all
+            let worth = error < WORTH_GROWING * least_of_all
                 && (!candidate.separate || divided)
                 && starts.len() <= GROWN;
             if elsewhere || worth {
@@ -188,31 +184,34 @@ impl Search<'_> {
     }
 }
 
+/// The least error among some candidates.
+fn least<'j>(found: impl Iterator<Item = &'j Judged>) -> f64 {
+    found.map(Judged::error).fold(f64::INFINITY, f64::min)
+}
+
 /// Those of the candidates looked at that are fitted to the end, the best first.
 fn contest(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
-    looked.sort_by(|a, b| nrmse(&a.1.rank).total_cmp(&nrmse(&b.1.rank)));
+    looked.sort_by(|a, b| a.1.error().total_cmp(&b.1.error()));
     let mut finalists: Vec<Judged> = Vec::new();
     for k in 0..looked.len() {
         let (i, found) = &looked[k];
-        let id = found.candidate.meta.id;
+        let (id, error) = (found.candidate.meta.id, found.error());
         // Of several starts of one candidate the best counts.
         let again = looked[..k].iter().any(|(j, _)| i == j);
         let needless = looked.iter().any(|(_, other)| {
-            nrmse(&other.rank) < CLOSE * nrmse(&found.rank)
-                && spares(&other.candidate, &found.candidate)
+            spares(&other.candidate, &found.candidate) && other.error() < CLOSE * error
         });
         let siblings: Vec<&Judged> = (finalists.iter())
             .filter(|j| j.candidate.meta.id == id)
             .collect();
         let elsewhere = siblings.first().is_some_and(|best| {
-            best.candidate.at != found.candidate.at
-                && nrmse(&found.rank) > ELSEWHERE * nrmse(&best.rank)
+            best.candidate.at != found.candidate.at && error > ELSEWHERE * best.error()
         });
         // A special case of one that did well may only not have come to its end.
         let special = |j: &Judged| is_special(&found.candidate, &j.candidate);
-        let far = (finalists.first())
-            .is_some_and(|best| nrmse(&found.rank) > FAR * nrmse(&best.rank))
-            && !finalists.iter().any(special);
+        let best = finalists.first();
+        let far =
+            best.is_some_and(|best| error > FAR * best.error()) && !finalists.iter().any(special);
         let places = if far { IN_ANY_CASE } else { FINALISTS };
         let crowded = siblings.len() >= SIBLINGS || finalists.len() >= places;
         if !again && !needless && !elsewhere && !crowded {

@@ -38,6 +38,11 @@ pub(crate) struct Judged {
 }
 
 impl Judged {
+    /// What candidates are ranked by, as one number.
+    pub(crate) fn error(&self) -> f64 {
+        nrmse(&self.rank)
+    }
+
     /// Judges the solution of `model`, a candidate's; none where its free run leaves the finite numbers.
     fn of(
         candidate: Candidate,
@@ -162,7 +167,7 @@ pub(crate) fn finish(
         fully(sharp, holdout, nominal, WILD)
     });
     let broad = fully(first, holdout, nominal, f64::INFINITY);
-    let error = |found: &(Judged, Fit)| nrmse(&found.0.rank);
+    let error = |found: &(Judged, Fit)| found.0.error();
     let of = |found: &Option<(Judged, Fit)>| found.as_ref().map_or(f64::INFINITY, error);
     // A width is one more thing to be found: it must be there beyond doubt.
     let soft = broad
