@@ -30,7 +30,7 @@ const ARROWS: [(&str, &[&str]); 13] = [
     ("diagnosis", &["core", "recordings"]),
     ("report", &["core", "recordings", "diagnosis"]),
     (
-        "cli",
+        "loopsight",
         &[
             "core",
             "plants",
@@ -55,7 +55,7 @@ const ARROWS: [(&str, &[&str]); 13] = [
             "diagnosis",
             "report",
             "hidden",
-            "cli",
+            "loopsight",
         ],
     ),
 ];
@@ -72,7 +72,10 @@ fn metadata() -> Metadata {
 }
 
 fn room(package: &str) -> Option<&str> {
-    package.strip_prefix("loopsight-")
+    match package {
+        "loopsight" => Some(package),
+        _ => package.strip_prefix("loopsight-"),
+    }
 }
 
 /// The rooms each room depends on, by kind of dependency.

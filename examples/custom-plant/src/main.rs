@@ -9,5 +9,5 @@ mod three_position;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    loopsight_cli::run()
+    loopsight::cli::run()
 }

@@ -1,7 +1,0 @@
-//! The command `loopsight`.
-
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    loopsight_cli::run()
-}

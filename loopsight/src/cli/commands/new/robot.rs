@@ -1,0 +1,136 @@
+//! A folder for a robot: model, experiment and loop, made from what a plant declares.
+
+use std::path::Path;
+
+use loopsight_core::config::{Source, nearest};
+use loopsight_core::loop_file::LoopFile;
+use loopsight_core::model::Model;
+use loopsight_core::registry;
+use loopsight_core::run::Run;
+use loopsight_core::{PlantMeta, Signal};
+
+use super::folder::Folder;
+use super::model_text::model_text;
+use super::pace::{Pace, rounded_down};
+use super::texts::{DRIVE, commands, experiment_text, loop_text, readme_text};
+use crate::cli::commands::run::compose;
+use crate::cli::commands::simulate::Experiment;
+use crate::cli::failure::Failure;
+use crate::cli::output;
+
+/// Noise of a sensor over what its signal does while the inputs are held once.
+const NOISE: f64 = 0.01;
+
+pub(super) fn write(target: &Path, plant: &str) -> Result<(), Failure> {
+    let meta = find(plant)?;
+    let mut folder = Folder::new(target)?;
+    let (model, measured) = example(meta)?;
+    let drive: Vec<f64> = meta.inputs.iter().map(|i| DRIVE * i.size).collect();
+    let pace = Pace::of(&model, &drive);
+    let text = model_text(folder.name(), meta, &model, &measured, pace);
+    let path = folder.write("model.toml", &text)?;
+    let (model, _) = Model::load(&path)?;
+
+    let trial = simulate(&model, &experiment_text(meta, &[], pace), meta)?;
+    let noise: Vec<(&str, f64)> = measured
+        .iter()
+        .zip(deviations(&trial, pace))
+        .map(|(signal, deviation)| (signal.id, rounded_down(NOISE * deviation)))
+        .filter(|(_, noise)| *noise > 0.0 && noise.is_finite())
+        .collect();
+    let text = experiment_text(meta, &noise, pace);
+    simulate(&model, &text, meta)?;
+    folder.write("experiment.toml", &text)?;
+
+    let looped = with_loop(&mut folder, meta, &trial, pace)?;
+    let text = readme_text(folder.name(), meta, looped);
+    folder.write("README.md", &text)?;
+    folder.finish()?;
+    output::result(&format!(
+        "next:\n  cd {}\n  {}",
+        target.display(),
+        commands().join("\n  ")
+    ));
+    Ok(())
+}
+
+fn find(id: &str) -> Result<&'static PlantMeta, Failure> {
+    let plants = registry::plants();
+    if let Some(meta) = plants.iter().find(|m| m.id == id) {
+        return Ok(meta);
+    }
+    let ids: Vec<&str> = plants.iter().map(|m| m.id).collect();
+    let mut message = format!("there is no plant `{id}`");
+    if let Some(near) = nearest(id, ids.iter().copied()) {
+        message.push_str(&format!("; did you mean `{near}`?"));
+    }
+    message.push_str(&format!(" Known are {}.", ids.join(", ")));
+    message.push_str(" A plant of your own: `loopsight new FOLDER --rust`");
+    Err(Failure::request(message))
+}
+
+/// The plant with the values of its own example, and what is measured on it: what a velocity
+/// controller acts on, or else all states.
+fn example(meta: &'static PlantMeta) -> Result<(Model, Vec<&'static Signal>), Failure> {
+    let (model, _) = Model::from_toml(&format!("the example of `{}`", meta.id), meta.example)?;
+    let missing = model.missing_values();
+    if !missing.is_empty() {
+        return Err(Failure::work(format!(
+            "the example of the plant `{}` gives no value for {}: without them nothing can run",
+            meta.id,
+            missing.join(", ")
+        )));
+    }
+    let measured = if meta.controlled.is_empty() {
+        meta.states.iter().collect()
+    } else {
+        meta.controlled.iter().map(|i| &meta.states[*i]).collect()
+    };
+    Ok((model, measured))
+}
+
+fn simulate(model: &Model, text: &str, meta: &PlantMeta) -> Result<Run, Failure> {
+    let file = format!("the experiment for `{}`", meta.id);
+    let source = Source::parse(&file, text)?;
+    Ok(Experiment::parse(&source)?.simulate(&source, model)?)
+}
+
+/// What each measured signal does while the inputs are held once: the rms of its change over that
+/// time, over √2. Of a signal that comes to rest it is the standard deviation; of one that drifts
+/// away it is not the whole way.
+fn deviations(run: &Run, pace: Pace) -> Vec<f64> {
+    let apart = ((pace.hold() / pace.period()) as usize).clamp(1, run.len().max(2) - 1);
+    (0..run.n_measured)
+        .map(|i| {
+            let squares = (apart..run.len()).map(|k| {
+                let change = run.sample(k)[i] - run.sample(k - apart)[i];
+                change * change
+            });
+            let mean = squares.sum::<f64>() / run.len().saturating_sub(apart).max(1) as f64;
+            (0.5 * mean).sqrt()
+        })
+        .collect()
+}
+
+/// Writes the first loop that can be composed: one that learns, or one that does not. A plant
+/// without controlled states has none.
+fn with_loop(
+    folder: &mut Folder,
+    meta: &PlantMeta,
+    trial: &Run,
+    pace: Pace,
+) -> Result<bool, Failure> {
+    for learns in [true, false] {
+        let text = loop_text(folder.name(), meta, &deviations(trial, pace), pace, learns);
+        let path = folder.inside().join("loop.toml");
+        let source = Source::parse(&path.display().to_string(), &text)?;
+        let composed = LoopFile::parse(&source)
+            .map_err(Failure::from)
+            .and_then(|file| compose(&path, &source, &file));
+        if composed.is_ok() {
+            folder.write("loop.toml", &text)?;
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}

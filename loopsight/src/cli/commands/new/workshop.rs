@@ -1,0 +1,230 @@
+//! A crate with a plant and an effect of its own, and the whole command around them.
+
+use std::path::{Path, PathBuf};
+
+use loopsight_core::config::read_text;
+
+use super::folder::Folder;
+use crate::cli::failure::Failure;
+use crate::cli::output;
+
+/// Files of `examples/custom-plant`, which is built and tested as it stands: what is handed out
+/// here is what is known to work.
+const FILES: [(&str, &str); 6] = [
+    (
+        "src/ship_heading.rs",
+        include_str!("../../../../../examples/custom-plant/src/ship_heading.rs"),
+    ),
+    (
+        "src/norrbin_damping.rs",
+        include_str!("../../../../../examples/custom-plant/src/norrbin_damping.rs"),
+    ),
+    (
+        "model.toml",
+        include_str!("../../../../../examples/custom-plant/model.toml"),
+    ),
+    (
+        "ship.toml",
+        include_str!("../../../../../examples/custom-plant/ship.toml"),
+    ),
+    (
+        "zigzag.toml",
+        include_str!("../../../../../examples/custom-plant/zigzag.toml"),
+    ),
+    (
+        "turns.toml",
+        include_str!("../../../../../examples/custom-plant/turns.toml"),
+    ),
+];
+
+const MAIN: &str = r"//! The command `loopsight` with a plant and an effect of our own in it.
+//!
+//! A part is known as soon as its file is a module here: `cargo run -- list` shows it, and models,
+//! fits, diagnoses and pages use it.
+
+mod norrbin_damping;
+mod ship_heading;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    loopsight::cli::run()
+}
+";
+
+/// What to type next.
+const COMMANDS: [&str; 3] = [
+    "cargo run -- explain ship_heading",
+    "cargo run -- simulate ship.toml turns.toml -o turns.csv",
+    "cargo run -- diagnose model.toml turns.csv --html why.html",
+];
+
+/// The checkout that this command was built from.
+const BUILT_FROM: &str = env!("CARGO_MANIFEST_DIR");
+
+pub(super) fn write(target: &Path, loopsight: Option<&Path>) -> Result<(), Failure> {
+    let mut folder = Folder::new(target)?;
+    check_name(folder.name())?;
+    let checkout = checkout(loopsight)?;
+    let manifest = manifest(folder.name(), &checkout);
+    folder.write("Cargo.toml", &manifest)?;
+    // With the versions of everything that loopsight itself was tested with.
+    folder.write("Cargo.lock", &read_text(&checkout.join("Cargo.lock"))?)?;
+    folder.write("src/main.rs", MAIN)?;
+    for (name, text) in FILES {
+        folder.write(name, text)?;
+    }
+    let text = readme(folder.name());
+    folder.write("README.md", &text)?;
+    folder.write(".gitignore", "/target\n")?;
+    folder.finish()?;
+    output::note(&format!(
+        "loopsight is taken from {}; `--loopsight PATH` names another checkout",
+        checkout.display()
+    ));
+    output::result(&format!(
+        "next:\n  cd {}\n  {}",
+        target.display(),
+        COMMANDS.join("\n  ")
+    ));
+    Ok(())
+}
+
+/// Names that cargo or Rust keeps for itself; keywords are refused by cargo with a message of its
+/// own.
+const RESERVED: [&str; 8] = [
+    "alloc",
+    "build",
+    "core",
+    "proc_macro",
+    "std",
+    "test",
+    "loopsight-core",
+    "loopsight",
+];
+
+fn check_name(name: &str) -> Result<(), Failure> {
+    let mut letters = name.chars();
+    let first = letters.next().is_some_and(|c| c.is_ascii_alphabetic());
+    let rest = letters.all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+    if first && rest && !RESERVED.contains(&name) {
+        return Ok(());
+    }
+    let cleaned: String = name
+        .chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() || c == '_' {
+                c.to_ascii_lowercase()
+            } else {
+                '-'
+            }
+        })
+        .collect();
+    let cleaned = cleaned.trim_matches('-');
+    let near = if cleaned.starts_with(|c: char| c.is_ascii_alphabetic()) && cleaned != name {
+        cleaned.to_owned()
+    } else {
+        format!("my-{cleaned}")
+    };
+    Err(Failure::request(format!(
+        "`{name}` cannot be the name of a crate, expected a letter and then letters, digits, - or _; \
+         `{near}` would do"
+    )))
+}
+
+/// The checkout to build with: the one that was named, or the one this command came from.
+fn checkout(named: Option<&Path>) -> Result<PathBuf, Failure> {
+    let path = match named {
+        Some(path) => path.to_owned(),
+        None => Path::new(BUILT_FROM).join(".."),
+    };
+    let lacking = ["core/Cargo.toml", "loopsight/Cargo.toml", "Cargo.lock"]
+        .into_iter()
+        .find(|file| !path.join(file).is_file());
+    let found = match lacking {
+        None => path.canonicalize().map_err(|e| e.to_string()),
+        Some(file) => Err(format!("there is no {}", path.join(file).display())),
+    };
+    found.map_err(|why| {
+        Failure::request(if named.is_some() {
+            format!("{} is no checkout of loopsight: {why}", path.display())
+        } else {
+            format!(
+                "the sources that this command was built from are gone ({why}), and the crates of \
+                 loopsight are not published: clone its repository and say where it is with \
+                 `--loopsight PATH`"
+            )
+        })
+    })
+}
+
+fn manifest(name: &str, checkout: &Path) -> String {
+    // A JSON string is a TOML string.
+    let path = |room: &str| {
+        let path = checkout.join(room).display().to_string();
+        serde_json::Value::from(path).to_string()
+    };
+    format!(
+        r#"[package]
+name = "{name}"
+version = "0.1.0"
+edition = "2024"
+publish = false
+
+[dependencies]
+# What the equations are written with.
+loopsight-core = {{ path = {} }}
+# The command `loopsight` with all that ships, for the parts of this crate to join.
+loopsight = {{ path = {} }}
+
+# Not a member of a workspace that the folder may lie in.
+[workspace]
+
+# Numerics in an unoptimised build crawl.
+[profile.dev]
+opt-level = 2
+debug = "line-tables-only"
+"#,
+        path("core"),
+        path("loopsight")
+    )
+}
+
+fn readme(name: &str) -> String {
+    format!(
+        "# {name}\n\n\
+         The command `loopsight` with a plant and an effect of its own.\n\n\
+         | file | what |\n|---|---|\n\
+         | `src/ship_heading.rs` | the plant: a ship that is steered with its rudder |\n\
+         | `src/norrbin_damping.rs` | the effect: damping of the hull with the cube of the yaw rate |\n\
+         | `src/main.rs` | names both, and runs the command |\n\
+         | `ship.toml` | the ship as it is, with the effect |\n\
+         | `model.toml` | what one believes of it, without the effect |\n\
+         | `zigzag.toml`, `turns.toml` | what the ship is driven with |\n\n\
+         The next three commands, in this folder; the first one builds for some minutes:\n\n\
+         ```sh\n{}\n```\n\n\
+         The last one says which physics the model lacks: an effect that no other crate knows. Add it, and\n\
+         the error falls to the noise of the sensors:\n\n\
+         ```sh\ncargo run -- improve model.toml turns.csv -o better.toml\n```\n\n\
+         Now make it yours: rename a file, the struct in it, its `mod` line in `src/main.rs` and the `id`\n\
+         in `META` and in the last macro; write your own equation in `derivative` or `contribution`, and\n\
+         say in `META` what it is made of. `cargo test` runs the tests that lie beside the equations. The\n\
+         pages `docs/add-a-plant.md` and `docs/add-an-effect.md` of loopsight go through both files.\n",
+        COMMANDS.join("\n")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_cargo_refuses_are_refused_with_one_that_it_takes() {
+        for right in ["ship", "my-crate", "a_1"] {
+            assert!(check_name(right).is_ok(), "{right}");
+        }
+        for wrong in ["1st", "my crate", "core", "größe", "-"] {
+            assert!(check_name(wrong).is_err(), "{wrong}");
+        }
+    }
+}

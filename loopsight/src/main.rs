@@ -1,0 +1,7 @@
+//! The command `loopsight`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    loopsight::cli::run()
+}
