@@ -1,6 +1,6 @@
 //! Settings that are one number, or one per channel.
 
-use loopsight_core::registry::BuildError;
+use loopsight_model::registry::BuildError;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 

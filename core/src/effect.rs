@@ -183,7 +183,10 @@ pub trait Physics<S: Real>: Send + Sync {
     fn initial_state(&self, at: &Reading<'_, S>, p: &[S], z: &mut [S]);
 }
 
-/// Makes an [`Effect`] available behind [`Physics`] and, with `std`, in the registry.
+/// Makes an [`Effect`] available behind [`Physics`].
+///
+/// The macro of the same name in `loopsight-model` does this and adds the effect to the registry, see
+/// [`declare_plant!`](crate::declare_plant).
 ///
 /// ```ignore
 /// declare_effect!(CoulombFriction, "coulomb_friction", <2, 0>);
@@ -230,70 +233,5 @@ macro_rules! declare_effect {
                 }
             }
         }
-
-        $crate::register_effect!($effect, $id, <$np, $nz>);
-    };
-}
-
-/// Registration needs `std`; without it this expands to nothing.
-#[cfg(not(feature = "std"))]
-#[doc(hidden)]
-#[macro_export]
-macro_rules! register_effect {
-    ($($anything:tt)*) => {};
-}
-
-/// Gives an effect its typetag entry: `[effect.<id>]` in an `[[effect]]` of the TOML.
-#[cfg(feature = "std")]
-#[doc(hidden)]
-#[macro_export]
-macro_rules! register_effect {
-    ($effect:ident, $id:literal, <$np:literal, $nz:literal>) => {
-        const _: () = {
-            use $crate::__private::{inventory, serde, typetag};
-
-            impl $crate::registry::DeclaredEffect for $effect {
-                const META: &'static $crate::EffectMeta =
-                    &<$effect as $crate::Effect<$np, $nz>>::META;
-                const INSTANCE: &'static dyn $crate::registry::AnyPhysics = &$effect;
-            }
-
-            /// The effect as a file has it; typetag wants a type of this crate.
-            #[derive(Clone, Debug)]
-            struct Part($crate::registry::ConfiguredEffect<$effect>);
-
-            impl serde::Serialize for Part {
-                fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-                    serde::Serialize::serialize(&self.0, to)
-                }
-            }
-
-            impl<'de> serde::Deserialize<'de> for Part {
-                fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-                    serde::Deserialize::deserialize(from).map(Part)
-                }
-            }
-
-            #[typetag::serde(name = $id)]
-            impl $crate::registry::EffectPart for Part {
-                fn meta(&self) -> &'static $crate::EffectMeta {
-                    <$effect as $crate::registry::DeclaredEffect>::META
-                }
-                fn at(&self) -> &[String] {
-                    self.0.channels()
-                }
-                fn values(&self) -> &$crate::registry::Values {
-                    self.0.given()
-                }
-                fn physics(&self) -> &'static dyn $crate::registry::AnyPhysics {
-                    <$effect as $crate::registry::DeclaredEffect>::INSTANCE
-                }
-            }
-
-            inventory::submit! { $crate::registry::EffectEntry(
-                <$effect as $crate::registry::DeclaredEffect>::META,
-                <$effect as $crate::registry::DeclaredEffect>::INSTANCE,
-            ) }
-        };
     };
 }

@@ -1,11 +1,6 @@
 //! Limits of signals: how large they may be, and how fast they may change.
 
-#[cfg(feature = "std")]
-mod settings;
-
 use crate::Real;
-#[cfg(feature = "std")]
-pub use settings::{BuiltLimits, LimitSettings, SignalLimits, build};
 
 /// Holds signals within a magnitude and a rate, sample by sample.
 ///
@@ -85,7 +80,6 @@ impl<B> Limits<B> {
 }
 
 #[cfg(test)]
-#[cfg(feature = "std")]
 mod tests {
     use proptest::prelude::*;
 

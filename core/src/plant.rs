@@ -162,7 +162,10 @@ pub const fn check_sizes(
         && (meta.controlled.is_empty() || meta.controlled.len() == nu)
 }
 
-/// Makes a [`Plant`] available behind [`Dynamics`] and, with `std`, in the registry.
+/// Makes a [`Plant`] available behind [`Dynamics`].
+///
+/// The macro of the same name in `loopsight-model` does this and adds the plant to the registry. A crate
+/// that builds with and without `std` chooses between the two once, in its `lib.rs`.
 ///
 /// ```ignore
 /// declare_plant!(Ddmr, "ddmr", <6, 2, 4, 8, 4>);
@@ -173,7 +176,11 @@ macro_rules! declare_plant {
         const _: () = assert!(
             $crate::plant_check(
                 &<$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::META,
-                $nx, $nu, $nw, $np, $ny
+                $nx,
+                $nu,
+                $nw,
+                $np,
+                $ny
             ),
             "the sizes of the plant differ from its PlantMeta"
         );
@@ -236,67 +243,5 @@ macro_rules! declare_plant {
                 <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::derived(index, p)
             }
         }
-
-        $crate::register_plant!($plant, $id, <$nx, $nu, $nw, $np, $ny>);
-    };
-}
-
-/// Registration needs `std`; without it this expands to nothing.
-#[cfg(not(feature = "std"))]
-#[doc(hidden)]
-#[macro_export]
-macro_rules! register_plant {
-    ($($anything:tt)*) => {};
-}
-
-/// Gives a plant its typetag entry: `[plant.<id>]` in TOML.
-#[cfg(feature = "std")]
-#[doc(hidden)]
-#[macro_export]
-macro_rules! register_plant {
-    ($plant:ident, $id:literal, <$nx:literal, $nu:literal, $nw:literal, $np:literal, $ny:literal>) => {
-        const _: () = {
-            use $crate::__private::{inventory, serde, typetag};
-
-            impl $crate::registry::DeclaredPlant for $plant {
-                const META: &'static $crate::PlantMeta =
-                    &<$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::META;
-                const INSTANCE: &'static dyn $crate::registry::AnyDynamics = &$plant;
-            }
-
-            /// The plant as a file has it; typetag wants a type of this crate.
-            #[derive(Clone, Debug)]
-            struct Part($crate::registry::ConfiguredPlant<$plant>);
-
-            impl serde::Serialize for Part {
-                fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-                    serde::Serialize::serialize(&self.0, to)
-                }
-            }
-
-            impl<'de> serde::Deserialize<'de> for Part {
-                fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-                    serde::Deserialize::deserialize(from).map(Part)
-                }
-            }
-
-            #[typetag::serde(name = $id)]
-            impl $crate::registry::PlantPart for Part {
-                fn meta(&self) -> &'static $crate::PlantMeta {
-                    <$plant as $crate::registry::DeclaredPlant>::META
-                }
-                fn values(&self) -> &$crate::registry::Values {
-                    self.0.given()
-                }
-                fn dynamics(&self) -> &'static dyn $crate::registry::AnyDynamics {
-                    <$plant as $crate::registry::DeclaredPlant>::INSTANCE
-                }
-            }
-
-            inventory::submit! { $crate::registry::PlantEntry(
-                <$plant as $crate::registry::DeclaredPlant>::META,
-                <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::DERIVED,
-            ) }
-        };
     };
 }

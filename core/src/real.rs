@@ -169,38 +169,3 @@ impl Real for f64 {
         libm::pow(self, exponent)
     }
 }
-
-#[cfg(all(test, feature = "std"))]
-mod tests {
-    use super::*;
-    use crate::{Dual, derivative, variable};
-
-    #[test]
-    fn a_branch_takes_the_derivative_of_its_side() {
-        let x = variable(-2.0, 3);
-        assert_eq!(Real::abs(x).value(), 2.0);
-        assert_eq!(derivative(&Real::abs(x), 3), -1.0);
-        assert_eq!(derivative(&x.held(Dual::of(-1.0), Dual::of(1.0)), 3), 0.0);
-    }
-
-    #[test]
-    fn elementary_functions_have_their_derivatives() {
-        let h = 1e-6;
-        type Pair = (fn(f64) -> f64, fn(Dual) -> Dual);
-        let functions: [Pair; 9] = [
-            (Real::sin, Real::sin),
-            (Real::cos, Real::cos),
-            (Real::tanh, Real::tanh),
-            (Real::exp, Real::exp),
-            (Real::sqrt, Real::sqrt),
-            (Real::ln, Real::ln),
-            (|x| Real::atan2(x, 2.0 - x), |x| x.atan2(Dual::of(2.0) - x)),
-            (|x| Real::powf(x, 1.5 * x), |x| x.powf(Dual::of(1.5) * x)),
-            (|x| Real::powf(-x, 3.0), |x| (-x).powf(Dual::of(3.0))),
-        ];
-        for (plain, dual) in functions {
-            let numeric = (plain(0.7 + h) - plain(0.7 - h)) / (2.0 * h);
-            assert!((derivative(&dual(variable(0.7, 0)), 0) - numeric).abs() < 1e-9);
-        }
-    }
-}

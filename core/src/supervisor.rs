@@ -1,16 +1,11 @@
 //! The supervisor: falls back to the last good model, then stops, and says why.
 
 mod models;
-#[cfg(feature = "std")]
-mod settings;
 #[cfg(test)]
-#[cfg(feature = "std")]
 mod tests;
 mod watch;
 
 use crate::{AffineModel, Observation, Observer, Real};
-#[cfg(feature = "std")]
-pub use settings::{SupervisorSettings, described, turning};
 pub use watch::{Supervisor, Thresholds};
 
 /// What a supervisor did.
@@ -27,7 +22,6 @@ pub enum Action {
 /// Why a supervisor acted; indices are those of the loop's measured signals, of
 /// regressions, or of shafts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Cause {
     /// The learned model predicts worse than the last good one; value and limit: times as bad.
     Worse(usize),

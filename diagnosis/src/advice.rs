@@ -1,6 +1,6 @@
 //! What to do next.
 
-use loopsight_core::model::Model;
+use loopsight_model::model::Model;
 use serde::Serialize;
 
 use crate::conclusion::{Conclusion, Explanation, Place};

@@ -1,9 +1,9 @@
 //! Everything the library could add to a model, and where.
 
-use loopsight_core::model::{Attached, Model, misfit};
-use loopsight_core::registry;
-use loopsight_core::sensor::Sensor;
 use loopsight_core::{Channel, EffectMeta, Parameter, Place, Role};
+use loopsight_model::model::{Attached, Model, misfit};
+use loopsight_model::registry;
+use loopsight_model::sensor::Sensor;
 
 use crate::positions::Positions;
 

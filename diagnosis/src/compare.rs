@@ -1,8 +1,8 @@
 //! A model against measurements: free run and one step.
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
-use loopsight_core::simulate::{Simulator, free_run};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+use loopsight_model::simulate::{Simulator, free_run};
 use loopsight_recordings::Fault;
 use nalgebra::DVector;
 use serde::Serialize;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::model::Model;
+use loopsight_model::model::Model;
 use loopsight_recordings::Fault;
 use serde::Serialize;
 

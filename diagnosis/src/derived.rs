@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::model::Model;
-use loopsight_core::{DUAL_WIDTH, Dual, Real, derivative, variable};
+use loopsight_core::Real;
+use loopsight_model::model::Model;
+use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::DMatrix;
 
 use crate::fit::{Estimate, Verdict};

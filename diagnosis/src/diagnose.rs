@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_recordings::{Fault, Severity};
 
 use crate::advice::{self, Advice};

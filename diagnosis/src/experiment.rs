@@ -36,9 +36,9 @@ mod question;
 mod rival;
 mod shapes;
 
-use loopsight_core::model::Model;
-use loopsight_core::registry::BuildError;
-use loopsight_core::sensor::Sensor;
+use loopsight_model::model::Model;
+use loopsight_model::registry::BuildError;
+use loopsight_model::sensor::Sensor;
 use rayon::prelude::*;
 
 use crate::observer::unstable_at_rest;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_recordings::Fault;
 use serde::Serialize;
 
@@ -156,7 +156,7 @@ pub enum FitError {
     Solver(String),
     /// The estimator's table is wrong.
     #[error(transparent)]
-    Build(#[from] loopsight_core::registry::BuildError),
+    Build(#[from] loopsight_model::registry::BuildError),
     /// The estimator is not linked.
     #[error("no estimator `{0}` is linked into this program")]
     NoEstimator(String),

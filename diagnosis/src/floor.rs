@@ -1,15 +1,15 @@
 //! The error that noise and resolution alone would leave.
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
-use loopsight_core::sensor::Sensor;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+use loopsight_model::sensor::Sensor;
 
 use crate::score::Tally;
 
 /// `nrmse` over all signals of a model without any fault.
 ///
 /// Counted encoders: the standard deviation of rounding, from their resolution
-/// ([`loopsight_core::sensor::Encoder::noise`]). Other sensors: third differences of the
+/// ([`loopsight_model::sensor::Encoder::noise`]). Other sensors: third differences of the
 /// measurement, in which a smooth motion vanishes and white noise of variance `σ²` has the variance
 /// `20 σ²`; the median keeps jumps of the motion out. A sensor that is read more often than it has
 /// something new (a bus that updates every 20 ms, a coarse scale) is late by anything between

@@ -1,7 +1,7 @@
 //! Which samples a fit may see, and how the others judge it.
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 
 use crate::judge::Losses;
 use crate::prediction::{InitialStates, predict};

@@ -1,7 +1,7 @@
 //! Diagnose, add, refit, until nothing more is missing.
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_recordings::Fault;
 use serde::Serialize;
 

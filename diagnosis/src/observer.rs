@@ -3,10 +3,11 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
-use loopsight_core::simulate::{Simulator, StateObserver};
-use loopsight_core::{DUAL_WIDTH, Dual, Real, derivative, variable};
+use loopsight_core::Real;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+use loopsight_model::simulate::{Simulator, StateObserver};
+use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 

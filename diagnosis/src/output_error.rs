@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 

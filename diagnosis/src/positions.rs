@@ -1,10 +1,10 @@
 //! The free run with the positions as they were measured.
 
-use loopsight_core::model::{Model, pseudo_inverse};
-use loopsight_core::registry::HostReal;
-use loopsight_core::run::Run;
-use loopsight_core::simulate::{Simulator, free_run};
 use loopsight_core::{EffectMeta, Role};
+use loopsight_model::model::{Model, pseudo_inverse};
+use loopsight_model::registry::HostReal;
+use loopsight_model::run::Run;
+use loopsight_model::simulate::{Simulator, free_run};
 use nalgebra::DMatrix;
 
 /// Keeps the integrals of the plant (angles, ways) where the measurement has them, while the speeds

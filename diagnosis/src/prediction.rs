@@ -1,9 +1,10 @@
 //! Simulated outputs with exact derivatives, initial states, and the one-step prediction.
 
-use loopsight_core::model::{Model, pseudo_inverse};
-use loopsight_core::run::Run;
-use loopsight_core::simulate::{Simulator, follow};
-use loopsight_core::{DUAL_WIDTH, Dual, Real, derivative, variable};
+use loopsight_core::Real;
+use loopsight_model::model::{Model, pseudo_inverse};
+use loopsight_model::run::Run;
+use loopsight_model::simulate::{Simulator, follow};
+use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::{DMatrix, DVector};
 
 use crate::positions::{Positions, run_with};

@@ -2,8 +2,8 @@
 
 use std::cell::{Cell, RefCell};
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::{FitError, FitSettings};

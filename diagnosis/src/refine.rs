@@ -1,7 +1,7 @@
 //! What is put right in a model once another effect was added to it.
 
-use loopsight_core::model::{Attached, Model};
-use loopsight_core::run::Run;
+use loopsight_model::model::{Attached, Model};
+use loopsight_model::run::Run;
 use rayon::prelude::*;
 
 use crate::candidates::{is_width, smooth};

@@ -1,9 +1,9 @@
 //! Regressions over whole recordings.
 
-use loopsight_core::model::{Model, pseudo_inverse};
-use loopsight_core::regression::RegressionError;
-pub use loopsight_core::regression::{Regression, Scheme};
-use loopsight_core::run::{Hold, Run};
+use loopsight_model::model::{Model, pseudo_inverse};
+use loopsight_model::regression::RegressionError;
+pub use loopsight_model::regression::{Regression, Scheme};
+use loopsight_model::run::{Hold, Run};
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::FitError;

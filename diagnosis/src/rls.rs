@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use loopsight_core::Estimator;
-use loopsight_core::model::Model;
-use loopsight_core::registry::EstimatorPart;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::registry::EstimatorPart;
+use loopsight_model::run::Run;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::compare::Comparison;
@@ -136,7 +136,7 @@ pub(crate) fn fit(
 /// An `rls` with `n` parameters, starting from zero, by way of the registry.
 fn estimator(n: usize) -> Result<Box<dyn Estimator<f64>>, FitError> {
     let source = "rls = { initial_covariance = 1e9 }";
-    let part: Box<dyn EstimatorPart> = loopsight_core::config::Source::parse("rls", source)
+    let part: Box<dyn EstimatorPart> = loopsight_model::config::Source::parse("rls", source)
         .and_then(|s| s.read())
         .map_err(|_| FitError::NoEstimator("rls".to_owned()))?;
     Ok(part.build(&vec![0.0; n])?)

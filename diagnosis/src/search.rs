@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use rayon::prelude::*;
 
 use crate::candidates::Candidate;

@@ -1,6 +1,6 @@
 //! One full Gauss–Newton step: what it promises, and where it leads.
 
-use loopsight_core::model::pseudo_inverse;
+use loopsight_model::model::pseudo_inverse;
 use nalgebra::DVector;
 
 use crate::problem::Problem;

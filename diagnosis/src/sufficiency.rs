@@ -1,7 +1,7 @@
 //! Whether a recording can carry a model at all.
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 
 use crate::advice::Advice;
 

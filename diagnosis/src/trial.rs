@@ -1,6 +1,6 @@
 //! One candidate at a time: what it promises, a first look, the full fit.
 
-use loopsight_core::model::Model;
+use loopsight_model::model::Model;
 
 use crate::candidates::Candidate;
 use crate::diagnose::SIGNIFICANT;

@@ -1,8 +1,8 @@
 //! Where a model fails, in words with numbers: the one place that says so.
 
-use loopsight_core::model::{Model, signals};
-use loopsight_core::run::Run;
-use loopsight_core::simulate::{Simulator, follow};
+use loopsight_model::model::{Model, signals};
+use loopsight_model::run::Run;
+use loopsight_model::simulate::{Simulator, follow};
 use serde::Serialize;
 
 use crate::motion::{Motion, changes, rest, speed};

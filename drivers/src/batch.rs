@@ -1,8 +1,8 @@
 //! The simulated robot driven by a given sequence, for recordings without a loop.
 
-use loopsight_core::model::Model;
-use loopsight_core::registry::BuildError;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::registry::BuildError;
+use loopsight_model::run::Run;
 
 use crate::robot::Robot;
 use crate::simulated::Simulated;
@@ -131,7 +131,7 @@ mod tests {
             assert!(errors.iter().all(|e| e.abs() < bound));
             // The errors telescope: their sum is one rounding at most.
             assert!(mean.abs() <= bound / (n - 1) as f64, "mean {mean}");
-            let loopsight_core::sensor::Sensor::EncoderCounts(encoder) =
+            let loopsight_model::sensor::Sensor::EncoderCounts(encoder) =
                 &model.measured[signal].sensor
             else {
                 panic!("no encoder");

@@ -1,8 +1,8 @@
 //! Incremental encoders: what counting does to an angle, and to the velocities made of it.
 
-use loopsight_core::model::{Model, signals};
-use loopsight_core::registry::BuildError;
-use loopsight_core::sensor::Sensor;
+use loopsight_model::model::{Model, signals};
+use loopsight_model::registry::BuildError;
+use loopsight_model::sensor::Sensor;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 

@@ -1,6 +1,6 @@
 //! What goes wrong with the sensors of a simulated robot, and when.
 
-use loopsight_core::registry::BuildError;
+use loopsight_model::registry::BuildError;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -216,7 +216,7 @@ fn misnamed(key: &str, what: &str, found: &str, ids: &[&str]) -> BuildError {
 
 #[cfg(test)]
 mod tests {
-    use loopsight_core::config::Source;
+    use loopsight_model::config::Source;
 
     use super::*;
     use crate::fixture::{WHEEL, build, twil_encoders};

@@ -1,8 +1,8 @@
 //! Robots with known answers, for the tests of this crate.
 
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, DriverContext, DriverPart, HostDriver};
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, DriverContext, DriverPart, HostDriver};
+use loopsight_model::run::Run;
 use loopsight_plants as _;
 
 /// Half track and wheel radius of [`twil`], m.

@@ -12,10 +12,11 @@ mod tests;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use loopsight_core::registry::{
+use loopsight_core::SystemClock;
+use loopsight_model::declare_part;
+use loopsight_model::registry::{
     BuildError, DriverContext, DriverPart, HostDriver, PartMeta, Setting,
 };
-use loopsight_core::{SystemClock, declare_part};
 use serde::{Deserialize, Serialize};
 
 use board::{Board, Plan};

@@ -1,11 +1,12 @@
 //! A recording as the robot.
 
-use loopsight_core::config::nearest;
-use loopsight_core::registry::{
+use loopsight_core::{Driver, DriverFault, Sample};
+use loopsight_model::config::nearest;
+use loopsight_model::declare_part;
+use loopsight_model::registry::{
     BuildError, DriverContext, DriverPart, HostDriver, HostDriverError, PartMeta, Setting,
 };
-use loopsight_core::run::Run;
-use loopsight_core::{Driver, DriverFault, Sample, declare_part};
+use loopsight_model::run::Run;
 use serde::{Deserialize, Serialize};
 
 /// Distance of a time stamp from where the loop's period has it, relative to the period, beyond

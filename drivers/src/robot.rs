@@ -1,9 +1,9 @@
 //! The robot behind the simulated driver: a model integrated finely, with sensors and limits.
 
-use loopsight_core::config::nearest;
-use loopsight_core::model::Model;
-use loopsight_core::registry::BuildError;
-use loopsight_core::simulate::Simulator;
+use loopsight_model::config::nearest;
+use loopsight_model::model::Model;
+use loopsight_model::registry::BuildError;
+use loopsight_model::simulate::Simulator;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

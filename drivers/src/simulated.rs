@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::model::Model;
-use loopsight_core::registry::{
+use loopsight_core::{Driver, DriverFault, Sample};
+use loopsight_model::declare_part;
+use loopsight_model::model::Model;
+use loopsight_model::registry::{
     BuildError, DriverContext, DriverPart, HostDriver, HostDriverError, PartMeta, Setting,
 };
-use loopsight_core::sensor::Sensor;
-use loopsight_core::{Driver, DriverFault, Sample, declare_part};
+use loopsight_model::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
 use crate::fault::SensorFault;
@@ -318,7 +319,7 @@ impl Driver<f64> for SimulatedDriver {
 
 #[cfg(test)]
 mod tests {
-    use loopsight_core::config::Source;
+    use loopsight_model::config::Source;
 
     use super::*;
     use crate::fixture::{build, instants, model, twil, twil_encoders, voltages};

@@ -120,7 +120,7 @@ pub(crate) fn covariance<S: Real>(of: &impl loopsight_core::Estimator<S>) -> std
 /// The settings of an estimate with its covariance, as `rls` and `kalman` declare them.
 #[cfg(feature = "std")]
 pub(crate) mod declared {
-    use loopsight_core::registry::Setting;
+    use loopsight_model::registry::Setting;
 
     pub(crate) const INITIAL_COVARIANCE: Setting = Setting::new(
         "initial_covariance",

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use loopsight_core::registry::BuildError;
+use loopsight_model::registry::BuildError;
 use loopsight_recordings::RecordingError;
 
 use crate::Hidden;

@@ -1,6 +1,6 @@
 //! What the motors are commanded.
 
-use loopsight_core::excitation::{Excitation, Sequence};
+use loopsight_model::excitation::{Excitation, Sequence};
 
 use crate::driven::Driven;
 use crate::error::HiddenError;

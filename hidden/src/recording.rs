@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use loopsight_core::run::Run;
+use loopsight_model::run::Run;
 use loopsight_recordings::write_csv;
 
 use crate::driven::{Driven, ELECTRICAL_TIME_CONSTANT};

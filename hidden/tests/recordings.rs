@@ -8,10 +8,10 @@
 use std::path::Path;
 
 use loopsight_core::Plant;
-use loopsight_core::model::Model;
 use loopsight_hidden::{
     Driven, Experiment, Hidden, Recording, Robot, catalogue, nrmse, overall, record, visibility,
 };
+use loopsight_model::model::Model;
 use loopsight_plants::Ddmr;
 
 fn make(effects: &[(Hidden, f64)], experiment: Experiment, seed: u64) -> Recording {
@@ -67,7 +67,7 @@ fn equal_seeds_give_equal_recordings() {
 /// Every shipped plant has a machine, and every machine hides something.
 #[test]
 fn no_plant_is_left_out() {
-    let plants = loopsight_core::registry::plants();
+    let plants = loopsight_model::registry::plants();
     let text: String = Robot::ALL.map(Robot::model_toml).concat();
     for plant in plants {
         let section = format!("[plant.{}", plant.id);
@@ -215,7 +215,7 @@ fn model_files_load_and_channels_exist() {
         let log = record(robot, &[], Experiment::Prbs, 1).unwrap();
         let (model, _) = Model::from_toml("model.toml", &log.model_toml).unwrap();
         assert_eq!(model.measured.len(), log.run.n_measured);
-        let effects = loopsight_core::registry::effects();
+        let effects = loopsight_model::registry::effects();
         let channels: Vec<&str> = model.plant.channels.iter().map(|c| c.id).collect();
         for effect in Hidden::ALL {
             let Ok(log) = record(robot, &[(*effect, 1.0)], Experiment::Prbs, 1) else {

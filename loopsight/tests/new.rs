@@ -9,7 +9,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use loopsight_core::registry::plants;
+use loopsight_model::registry::plants;
 use loopsight_plants as _;
 use tempfile::TempDir;
 

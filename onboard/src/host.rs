@@ -12,12 +12,13 @@ mod serial;
 mod told;
 
 use loopsight_controllers::FeedbackLinearizingPiSettings;
-use loopsight_core::identification::LearningSettings;
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, ControllerPart, PartMeta, Setting};
-use loopsight_core::{Controller, declare_part};
+use loopsight_core::Controller;
 use loopsight_estimators::RlsSettings;
 use loopsight_link::Safety;
+use loopsight_model::declare_part;
+use loopsight_model::identification::LearningSettings;
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, ControllerPart, PartMeta, Setting};
 use serde::{Deserialize, Serialize};
 
 use conversation::Conversation;

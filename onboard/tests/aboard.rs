@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 
 use desk::Desk;
-use loopsight_core::config::Source;
-use loopsight_core::loop_file::{Composed, LoopFile};
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, DriverContext};
 use loopsight_core::{ControlError, TickError};
 use loopsight_drivers as _;
+use loopsight_model::config::Source;
+use loopsight_model::loop_file::{Composed, LoopFile};
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, DriverContext};
 
 /// A robot at a socket: it hears `steps` steps, and then hangs up.
 fn robot(steps: usize) -> (PathBuf, JoinHandle<()>) {

@@ -4,12 +4,12 @@
 
 mod twil;
 
-use loopsight_core::identification::{Identification, LearningSettings};
-use loopsight_core::model::Model;
-use loopsight_core::regression::Scheme;
 use loopsight_core::{AffineModel, Command, Observation, Observer, Sample, Tick};
 use loopsight_estimators::RlsSettings;
 use loopsight_link::{Attachment, Unusable};
+use loopsight_model::identification::{Identification, LearningSettings};
+use loopsight_model::model::Model;
+use loopsight_model::regression::Scheme;
 use loopsight_onboard::{Efforts, Learner};
 use loopsight_plants::Ddmr;
 use twil::*;

@@ -11,12 +11,12 @@ use std::path::{Path, PathBuf};
 use desk::Desk;
 use loopsight_controllers as _;
 use loopsight_core::TickError;
-use loopsight_core::config::Source;
-use loopsight_core::loop_file::{Composed, LoopFile};
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, DriverContext};
 use loopsight_drivers as _;
 use loopsight_link::{Decoder, Hello, LONGEST, Reply, Request, Welcome, encode};
+use loopsight_model::config::Source;
+use loopsight_model::loop_file::{Composed, LoopFile};
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, DriverContext};
 
 const LOOP: &str = r#"
 model = "model.toml"

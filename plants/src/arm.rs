@@ -1,8 +1,9 @@
 //! A joint that gravity pulls at.
 
+use crate::declare_plant;
 use loopsight_core::{
     Channel, Derived, Parameter, Parameterization, Place, Plant, PlantMeta, Reads, Real, Role,
-    Signal, declare_plant,
+    Signal,
 };
 
 use crate::motor;

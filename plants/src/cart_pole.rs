@@ -1,8 +1,8 @@
 //! A pole on a cart.
 
+use crate::declare_plant;
 use loopsight_core::{
     Channel, Parameter, Parameterization, Place, Plant, PlantMeta, Reads, Real, Role, Signal,
-    declare_plant,
 };
 
 /// A pole that turns freely on a cart: the inverted pendulum, or a crane.

@@ -1,8 +1,9 @@
 //! One motor, one axis.
 
+use crate::declare_plant;
 use loopsight_core::{
     Channel, ControlAffine, Derived, Parameter, Parameterization, Place, Plant, PlantMeta, Reads,
-    Real, Role, Signal, declare_plant,
+    Real, Role, Signal,
 };
 
 use crate::motor;

@@ -2,7 +2,8 @@
 
 mod tables;
 
-use loopsight_core::{ControlAffine, Parameterization, Plant, PlantMeta, Real, declare_plant};
+use crate::declare_plant;
+use loopsight_core::{ControlAffine, Parameterization, Plant, PlantMeta, Real};
 
 use tables::{CHANNELS, INPUTS, INTEGRALS, LUMPED, OUTPUTS, PHYSICAL, STATES};
 

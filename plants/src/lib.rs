@@ -15,6 +15,11 @@ mod oscillator;
 mod servo_axis;
 mod tank_pair;
 
+#[cfg(not(feature = "std"))]
+use loopsight_core::{declare_effect, declare_plant};
+#[cfg(feature = "std")]
+use loopsight_model::{declare_effect, declare_plant};
+
 pub use arm::Arm;
 pub use cart_pole::CartPole;
 pub use dc_axis::DcAxis;

@@ -1,8 +1,9 @@
 //! A mass on a spring.
 
+use crate::declare_plant;
 use loopsight_core::{
     Channel, ControlAffine, Derived, Parameter, Parameterization, Place, Plant, PlantMeta, Reads,
-    Real, Role, Signal, declare_plant,
+    Real, Role, Signal,
 };
 
 /// A mass on a spring with a damper, driven by a force.

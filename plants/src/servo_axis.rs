@@ -1,7 +1,8 @@
 //! A slide that follows a position.
 
+use crate::declare_plant;
 use loopsight_core::{
-    Channel, Derived, Parameter, Place, Plant, PlantMeta, Reads, Real, Role, Signal, declare_plant,
+    Channel, Derived, Parameter, Place, Plant, PlantMeta, Reads, Real, Role, Signal,
 };
 
 /// A position-controlled slide: a mass behind a cascade of position and velocity control.

@@ -1,8 +1,9 @@
 //! Two tanks, one above the other.
 
+use crate::declare_plant;
 use loopsight_core::{
     Channel, Derived, Parameter, Parameterization, Place, Plant, PlantMeta, Reads, Real, Role,
-    Signal, declare_plant,
+    Signal,
 };
 
 /// Two tanks in cascade: a pump fills the upper one, which runs out into the lower one.
@@ -290,7 +291,8 @@ declare_plant!(TankPair, "tank_pair", <2, 1, 4, 4, 2>);
 
 #[cfg(test)]
 mod tests {
-    use loopsight_core::{Dual, derivative, rk4_step, variable};
+    use loopsight_core::rk4_step;
+    use loopsight_model::{Dual, derivative, variable};
 
     use super::*;
 

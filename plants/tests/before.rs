@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-use loopsight_core::model::Model;
-use loopsight_core::simulate::Simulator;
+use loopsight_model::model::Model;
+use loopsight_model::simulate::Simulator;
 use loopsight_plants as _;
 
 /// Where a spring of 2 N/m is after 10 ms under 2 N that come 0.1 s late, and late by a lag of 0.1 s,

@@ -5,12 +5,13 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::model::{Model, misfit};
-use loopsight_core::registry;
-use loopsight_core::run::Run;
-use loopsight_core::sensor::{Encoder, Sensor};
-use loopsight_core::simulate::{Simulator, free_run};
-use loopsight_core::{Dual, EffectMeta, Place, Real, derivative, unit, variable};
+use loopsight_core::{EffectMeta, Place, Real, unit};
+use loopsight_model::model::{Model, misfit};
+use loopsight_model::registry;
+use loopsight_model::run::Run;
+use loopsight_model::sensor::{Encoder, Sensor};
+use loopsight_model::simulate::{Simulator, free_run};
+use loopsight_model::{Dual, derivative, variable};
 use loopsight_plants as _;
 
 const DDMR: &str = "[plant.ddmr]\nK_A = -15.146\nK_B = 0.005\nK_C = 0.136\nK_D = -9.573\n\
@@ -90,7 +91,7 @@ fn channel_sets(model: &Model, meta: &EffectMeta) -> Vec<Vec<&'static str>> {
 
 /// What is measured to see an effect at these channels: a few ways of measuring.
 fn sensors(model: &Model, at: &[&str]) -> Vec<Vec<(String, Sensor)>> {
-    let signals: Vec<&str> = loopsight_core::model::signals(model.plant)
+    let signals: Vec<&str> = loopsight_model::model::signals(model.plant)
         .map(|s| s.id)
         .collect();
     let outputs: Vec<usize> = model

@@ -2,9 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
-use loopsight_core::simulate::{Simulator, free_run};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+use loopsight_model::simulate::{Simulator, free_run};
 use loopsight_plants as _;
 
 const PERIOD: f64 = 0.1;

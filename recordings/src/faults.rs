@@ -7,7 +7,7 @@ mod sign;
 mod still;
 mod stuck;
 
-use loopsight_core::run::Run;
+use loopsight_model::run::Run;
 
 use crate::fault::{Fault, FaultKind};
 use crate::map::Recording;

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use loopsight_core::Signal;
-use loopsight_core::run::{LogMap, Run};
-use loopsight_core::sensor::Sensor;
+use loopsight_model::run::{LogMap, Run};
+use loopsight_model::sensor::Sensor;
 
 use crate::error::RecordingError;
 use crate::fault::{Fault, FaultKind};

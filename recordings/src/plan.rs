@@ -1,8 +1,8 @@
 //! Which column is which signal, and the factor that makes it SI.
 
 use loopsight_core::Signal;
-use loopsight_core::run::LogMap;
 use loopsight_core::unit::{Unit, conversion, parse};
+use loopsight_model::run::LogMap;
 
 use crate::error::{RecordingError, nearest};
 use crate::fault::{Fault, FaultKind};

@@ -1,7 +1,7 @@
 //! The explanations that were tried, best first, with the evidence for each.
 
-use loopsight_core::registry;
 use loopsight_diagnosis::{Diagnosis, Estimate, Explanation};
+use loopsight_model::registry;
 
 use crate::bars::{Line, Scale};
 use crate::conclusion::{effect_name, found, place_name};

@@ -1,9 +1,9 @@
 //! What a diagnosis or an improvement concludes, in sentences.
 
-use loopsight_core::registry;
 use loopsight_diagnosis::{
     Conclusion, Diagnosis, Explanation, Improvement, Place, Verdict as Fitted,
 };
+use loopsight_model::registry;
 
 use crate::html::escape;
 use crate::numbers::percent;

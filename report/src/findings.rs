@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::model::Model;
 use loopsight_diagnosis::{
     Advice, Comparison, Conclusion, Diagnosis, Estimate, Explanation, Fit, Improvement, Level,
     Method, Place, Statement, Step, Verdict,
 };
+use loopsight_model::model::Model;
 use loopsight_plants as _;
 use loopsight_recordings::{Fault, FaultKind};
 

@@ -11,10 +11,10 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use loopsight_core::model::Model;
-use loopsight_core::simulate::{Simulator, free_run};
 use loopsight_diagnosis::diagnose;
 use loopsight_hidden::{Hidden, Recording, Robot, record_along};
+use loopsight_model::model::Model;
+use loopsight_model::simulate::{Simulator, free_run};
 use loopsight_plants as _;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -9,9 +9,9 @@
 //! * `pairs`: two effects hidden at once; both must be named.
 //! * `small`: friction of 3 % of full drive, ten seeds.
 
-use loopsight_core::model::Model;
 use loopsight_diagnosis::{Improvement, improve};
 use loopsight_hidden::{Experiment, Hidden, Recording, record_with};
+use loopsight_model::model::Model;
 use loopsight_plants as _;
 use rayon::prelude::*;
 

@@ -12,9 +12,9 @@
 
 use std::fmt::Write as _;
 
-use loopsight_core::model::Model;
 use loopsight_diagnosis::{Conclusion, Diagnosis, Explanation, Place, diagnose};
 use loopsight_hidden::{Experiment, Hidden, Robot, catalogue, record_with, refit};
+use loopsight_model::model::Model;
 use loopsight_plants as _;
 use rayon::prelude::*;
 

@@ -6,7 +6,7 @@
 
 use std::error::Error;
 
-use loopsight_core::model::signals;
+use loopsight_model::model::signals;
 use loopsight_recordings::{header, write_csv};
 use loopsight_tests::balance::{cart_pole, upright};
 use loopsight_tests::repository;

@@ -11,12 +11,12 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use loopsight_controllers as _;
-use loopsight_core::config::{Source, read_text};
-use loopsight_core::loop_file::LoopFile;
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, DriverContext, DriverPart};
 use loopsight_drivers::{Limit, Simulated};
 use loopsight_estimators as _;
+use loopsight_model::config::{Source, read_text};
+use loopsight_model::loop_file::LoopFile;
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, DriverContext, DriverPart};
 use loopsight_plants as _;
 use loopsight_report::{Figure, FigurePanel, FigureTrace, Style, figure_svg};
 

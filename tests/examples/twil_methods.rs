@@ -12,14 +12,14 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use loopsight_core::excitation::{Excitation, build, sample_rows};
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
-use loopsight_core::sensor::Sensor;
 use loopsight_diagnosis::fit::fit;
 use loopsight_diagnosis::{FitSettings, Method, Scheme};
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_estimators as _;
+use loopsight_model::excitation::{Excitation, build, sample_rows};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+use loopsight_model::sensor::Sensor;
 use loopsight_plants as _;
 use rayon::prelude::*;
 use serde::Deserialize;

@@ -3,9 +3,9 @@
 
 use std::f64::consts::TAU;
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
-use loopsight_core::simulate::Simulator;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+use loopsight_model::simulate::Simulator;
 
 use crate::{PERIOD, Random};
 

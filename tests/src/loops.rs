@@ -1,9 +1,9 @@
 //! Loops composed from text, around robots that are nowhere in a file.
 
-use loopsight_core::config::{ConfigError, Source};
-use loopsight_core::loop_file::{Composed, LoopFile};
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, DriverContext};
+use loopsight_model::config::{ConfigError, Source};
+use loopsight_model::loop_file::{Composed, LoopFile};
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, DriverContext};
 
 use crate::PERIOD;
 

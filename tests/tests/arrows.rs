@@ -12,27 +12,36 @@ use cargo_metadata::{DependencyKind, Edition, Metadata, MetadataCommand};
 use loopsight_tests::repository;
 
 /// Each room, and the rooms it may depend on. Siblings do not stand in each other's line.
-const ARROWS: [(&str, &[&str]); 13] = [
+const ARROWS: [(&str, &[&str]); 14] = [
     ("core", &[]),
+    ("model", &["core"]),
     ("link", &[]),
-    ("plants", &["core"]),
-    ("estimators", &["core"]),
-    ("controllers", &["core"]),
-    ("drivers", &["core"]),
+    ("plants", &["core", "model"]),
+    ("estimators", &["core", "model"]),
+    ("controllers", &["core", "model"]),
+    ("drivers", &["core", "model"]),
     // What runs on a robot is composed at build time, of everything that runs there.
     (
         "onboard",
-        &["core", "link", "plants", "estimators", "controllers"],
+        &[
+            "core",
+            "model",
+            "link",
+            "plants",
+            "estimators",
+            "controllers",
+        ],
     ),
-    ("recordings", &["core"]),
+    ("recordings", &["core", "model"]),
     // Machines that hide an effect share no equations with the plants they are held against.
-    ("hidden", &["core", "recordings"]),
-    ("diagnosis", &["core", "recordings"]),
-    ("report", &["core", "recordings", "diagnosis"]),
+    ("hidden", &["core", "model", "recordings"]),
+    ("diagnosis", &["core", "model", "recordings"]),
+    ("report", &["core", "model", "recordings", "diagnosis"]),
     (
         "loopsight",
         &[
             "core",
+            "model",
             "plants",
             "estimators",
             "controllers",
@@ -47,6 +56,7 @@ const ARROWS: [(&str, &[&str]); 13] = [
         "tests",
         &[
             "core",
+            "model",
             "plants",
             "estimators",
             "controllers",

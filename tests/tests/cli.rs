@@ -12,8 +12,8 @@ use std::process::{Child, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
-use loopsight_core::model::Model;
-use loopsight_core::registry::{effects, parts, plants};
+use loopsight_model::model::Model;
+use loopsight_model::registry::{effects, parts, plants};
 use loopsight_tests::{repository, twil_path};
 use serde_json::Value;
 use tempfile::TempDir;

@@ -6,10 +6,10 @@
 )]
 
 use loopsight_controllers::{PiResponse, settling_time};
-use loopsight_core::config::Source;
-use loopsight_core::model::{Affine, Model};
-use loopsight_core::registry::{BuildError, ControllerPart};
 use loopsight_core::{Controller, Driver, DriverFault, Loop, Rk4, Sample, SimulatedClock};
+use loopsight_model::config::Source;
+use loopsight_model::model::{Affine, Model};
+use loopsight_model::registry::{BuildError, ControllerPart};
 use loopsight_plants as _;
 
 const PERIOD: f64 = 0.01;

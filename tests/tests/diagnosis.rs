@@ -6,10 +6,10 @@
     reason = "helpers of tests: a failure is the test's failure"
 )]
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
 use loopsight_diagnosis::{Conclusion, Diagnosis, diagnose};
 use loopsight_hidden::{Experiment, Hidden, Recording, record_with};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_plants as _;
 use loopsight_tests::real_data;
 

@@ -8,13 +8,13 @@
 )]
 
 use assert_cmd::Command;
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
 use loopsight_diagnosis::{
     Conclusion, Diagnosis, Limits, Plan, Promise, Question, diagnose, experiment, place,
 };
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_hidden::{Hidden, Robot, record_along};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_tests::{PERIOD, recording, twil, twil_path};
 use serde_json::Value;
 use tempfile::TempDir;

@@ -7,13 +7,13 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::excitation::{Excitation, build, sample_rows};
-use loopsight_core::model::Model;
-use loopsight_core::registry::plants;
-use loopsight_core::run::Run;
 use loopsight_diagnosis::fit::fit;
 use loopsight_diagnosis::{Conclusion, FitSettings, diagnose};
 use loopsight_drivers::{Simulated, simulate_inputs};
+use loopsight_model::excitation::{Excitation, build, sample_rows};
+use loopsight_model::model::Model;
+use loopsight_model::registry::plants;
+use loopsight_model::run::Run;
 use loopsight_tests::{instants, repository, unknown};
 
 /// An axis with two states, a quadratic drag of its own, and a tachometer.

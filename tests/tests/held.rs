@@ -8,13 +8,13 @@
 )]
 
 use assert_cmd::Command;
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
 use loopsight_diagnosis::fit::{Fit, fit};
 use loopsight_diagnosis::{
     Because, Conclusion, FitSettings, Limits, Question, QuestionError, compare, diagnose,
     experiment,
 };
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_tests::balance::{axis, cart_pole, servo, upright};
 use loopsight_tests::{PERIOD, repository, unknown};
 use rayon::prelude::*;

@@ -5,9 +5,9 @@
     reason = "recordings that can be made, and a panic is how this program fails"
 )]
 
-use loopsight_core::model::Model;
 use loopsight_diagnosis::{FitSettings, diagnose, fit};
 use loopsight_hidden::{Experiment, Hidden, Robot, record};
+use loopsight_model::model::Model;
 use loopsight_plants as _;
 
 /// Fitted to a clean recording, the plant leaves of another one what rounding leaves.

@@ -6,10 +6,10 @@
     reason = "what is built here is right, and a panic is how this program fails"
 )]
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
-use loopsight_core::sensor::Sensor;
 use loopsight_diagnosis::{Fit, FitSettings, Method, Scheme, fit::fit};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+use loopsight_model::sensor::Sensor;
 use loopsight_tests::{PERIOD, instants, measured_by, prbs, recording, twil, unknown};
 use rayon::prelude::*;
 

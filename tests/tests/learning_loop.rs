@@ -7,8 +7,8 @@
 
 use allocation_counter::measure;
 use loopsight_core::learning::Withheld;
-use loopsight_core::loop_file::Composed;
-use loopsight_core::model::Model;
+use loopsight_model::loop_file::Composed;
+use loopsight_model::model::Model;
 use loopsight_tests::loops::{self, GAINS, velocity_loop};
 use loopsight_tests::{PERIOD, Random};
 use rayon::prelude::*;

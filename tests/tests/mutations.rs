@@ -6,12 +6,12 @@
     reason = "what is damaged here was right, and a panic is how this program fails"
 )]
 
-use loopsight_core::config::Source;
-use loopsight_core::loop_file::LoopFile;
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, DriverContext, parts, plants};
-use loopsight_core::run::Run;
 use loopsight_diagnosis::{FitSettings, Method, compare, fit::fit};
+use loopsight_model::config::Source;
+use loopsight_model::loop_file::LoopFile;
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, DriverContext, parts, plants};
+use loopsight_model::run::Run;
 use loopsight_recordings::{map, read, read_csv_from, read_sysid};
 use loopsight_tests::{Random, repository, twil, twil_path};
 

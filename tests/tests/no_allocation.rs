@@ -7,14 +7,14 @@
 
 use allocation_counter::measure;
 use loopsight_controllers::FeedbackLinearizingPiSettings;
-use loopsight_core::model::Model;
-use loopsight_core::registry::{ControllerPart, EstimatorPart};
-use loopsight_core::simulate::Simulator;
 use loopsight_core::{
     AffineModel, Clock, Controller, Driver, DriverFault, Estimator, Loop, Observation, Observer,
     Sample, SimulatedClock, Tick,
 };
 use loopsight_estimators::{Rls, RlsSettings};
+use loopsight_model::model::Model;
+use loopsight_model::registry::{ControllerPart, EstimatorPart};
+use loopsight_model::simulate::Simulator;
 use loopsight_plants as _;
 use nalgebra::{DVector, SVector};
 

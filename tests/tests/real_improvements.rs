@@ -10,7 +10,7 @@
 use std::ops::Range;
 
 use assert_cmd::Command;
-use loopsight_core::model::Model;
+use loopsight_model::model::Model;
 use loopsight_tests::{real_data, repository};
 use serde_json::Value;
 

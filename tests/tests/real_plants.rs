@@ -10,9 +10,9 @@
 use std::ops::Range;
 
 use loopsight_core::Signal;
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
 use loopsight_diagnosis::{Comparison, Conclusion, Fit, FitSettings, compare, diagnose, fit};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_tests::{real_data, repository};
 
 /// The model file `name`, with what `edit` makes of its text.

@@ -7,13 +7,13 @@
 
 use std::f64::consts::{PI, TAU};
 
-use loopsight_core::excitation::{Excitation, Sequence};
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
 use loopsight_diagnosis::{
     Conclusion, Diagnosis, FitSettings, ResidualForce, diagnose, fit, residual_force,
 };
 use loopsight_hidden::Driven as Robot;
+use loopsight_model::excitation::{Excitation, Sequence};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_plants as _;
 
 const PERIOD: f64 = 0.01;

@@ -10,10 +10,10 @@
     reason = "what is built here is right, and a panic is how this program fails"
 )]
 
-use loopsight_core::config::Source;
-use loopsight_core::registry::{ControllerPart, EstimatorPart};
 use loopsight_core::{Estimator, Real};
 use loopsight_estimators::{Rls, RlsSettings};
+use loopsight_model::config::Source;
+use loopsight_model::registry::{ControllerPart, EstimatorPart};
 use nalgebra::{DVector, SVector};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

@@ -8,9 +8,9 @@
 
 use allocation_counter::measure;
 use loopsight_core::TickError;
-use loopsight_core::loop_file::Composed;
-use loopsight_core::model::Model;
 use loopsight_core::supervisor::Action;
+use loopsight_model::loop_file::Composed;
+use loopsight_model::model::Model;
 use loopsight_tests::loops::{GAINS, velocity_loop};
 use loopsight_tests::{PERIOD, Random};
 use rayon::prelude::*;

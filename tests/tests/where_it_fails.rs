@@ -5,10 +5,10 @@
     reason = "helpers of tests: a failure is the test's failure"
 )]
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
 use loopsight_diagnosis::{Statement, compare};
 use loopsight_hidden::{Experiment, Hidden, Robot, record};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_plants as _;
 
 fn stiff_axis() -> (Model, Run) {

@@ -1,8 +1,9 @@
 //! `[controller.mrac]`: what a file says, and the controller built from it.
 
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, ControllerPart, PartMeta, Setting};
-use loopsight_core::{Controller, declare_part};
+use loopsight_core::Controller;
+use loopsight_model::declare_part;
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, ControllerPart, PartMeta, Setting};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 

@@ -283,7 +283,7 @@ fn every_effect_of_the_library_can_stand_in_a_loop() {
         (axis.to_owned(), "speed = { constant = 2.0 }"),
     ] {
         let base = model(&plant);
-        for meta in loopsight_core::registry::effects() {
+        for meta in loopsight_model::registry::effects() {
             for channel in base.plant.channels {
                 let Some(mut robot) = base.with_effect(meta.id, &[channel.id]) else {
                     continue;

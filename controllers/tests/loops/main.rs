@@ -12,12 +12,12 @@ mod tracking;
 mod truth;
 
 use loopsight_controllers as _;
-use loopsight_core::config::Source;
-use loopsight_core::loop_file::{Composed, LoopFile};
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, DriverContext};
 use loopsight_drivers as _;
 use loopsight_estimators as _;
+use loopsight_model::config::Source;
+use loopsight_model::loop_file::{Composed, LoopFile};
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, DriverContext};
 use loopsight_plants as _;
 
 /// The paper's robot, its velocities as they are.

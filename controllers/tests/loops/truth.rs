@@ -1,9 +1,9 @@
 //! The same on a machine that shares no equation with any model: friction that really sticks, currents
 //! in windings, marks of encoders.
 
-use loopsight_core::registry::HostDriverError;
 use loopsight_core::{Driver, DriverFault, Sample};
 use loopsight_hidden::{Hidden, Live, Robot};
+use loopsight_model::registry::HostDriverError;
 
 use super::*;
 

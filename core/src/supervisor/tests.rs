@@ -313,17 +313,3 @@ fn what_no_model_explains_stops_the_run() {
         "{event:?} {time} s"
     );
 }
-
-#[test]
-fn events_are_said_in_words() {
-    let event = Event {
-        action: Action::Stopped,
-        cause: Cause::Tracking(0),
-        value: 0.7,
-        limit: 0.5,
-    };
-    assert_eq!(
-        described(&event, &[("speed", "m/s")], &[]),
-        "stopped by the supervisor: speed is 0.700 m/s off its reference (limit 0.500 m/s)"
-    );
-}

@@ -1,9 +1,9 @@
 //! What is asked: effects and parameters by name, and models that have them at a noticeable size.
 
-use loopsight_core::config::nearest;
-use loopsight_core::model::{Model, misfit};
-use loopsight_core::registry::{self, BuildError};
 use loopsight_core::{EffectMeta, Place as Where};
+use loopsight_model::config::nearest;
+use loopsight_model::model::{Model, misfit};
+use loopsight_model::registry::{self, BuildError};
 
 use crate::Place;
 use crate::candidates::{channel_sets, suit};

@@ -1,8 +1,8 @@
 //! How far a rival stays from the truth after it did its best.
 
-use loopsight_core::model::{Model, pseudo_inverse};
-use loopsight_core::run::Run;
-use loopsight_core::sensor::Sensor;
+use loopsight_model::model::{Model, pseudo_inverse};
+use loopsight_model::run::Run;
+use loopsight_model::sensor::Sensor;
 use nalgebra::{DMatrix, DVector};
 
 use crate::experiment::Drive;

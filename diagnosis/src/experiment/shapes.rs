@@ -15,8 +15,8 @@
 //! Reference: L. Ljung (1999), "System Identification: Theory for the User", 2nd edition, section
 //! 13.3.
 
-use loopsight_core::excitation::Excitation;
-use loopsight_core::registry::BuildError;
+use loopsight_model::excitation::Excitation;
+use loopsight_model::registry::BuildError;
 
 use crate::experiment::Drive;
 

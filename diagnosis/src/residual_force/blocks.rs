@@ -1,6 +1,6 @@
 //! Least squares that are judged on blocks of time which they did not see.
 
-use loopsight_core::run::Run;
+use loopsight_model::run::Run;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::response::Responses;

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use loopsight_core::Role;
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use serde::Serialize;
 
 use super::blocks::Blocks;

@@ -1,10 +1,11 @@
 //! The model held to the measurements, sample by sample.
 
-use loopsight_core::model::{Model, pseudo_inverse};
-use loopsight_core::run::Run;
-use loopsight_core::sensor::Sensor;
-use loopsight_core::simulate::Simulator;
-use loopsight_core::{DUAL_WIDTH, Dual, Place, Real, derivative, variable};
+use loopsight_core::{Place, Real};
+use loopsight_model::model::{Model, pseudo_inverse};
+use loopsight_model::run::Run;
+use loopsight_model::sensor::Sensor;
+use loopsight_model::simulate::Simulator;
+use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 

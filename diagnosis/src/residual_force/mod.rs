@@ -10,8 +10,8 @@ mod select;
 mod shape;
 mod words;
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use nalgebra::DVector;
 use serde::Serialize;
 

@@ -1,8 +1,8 @@
 //! Where a residual force may act, and what it may depend on there.
 
-use loopsight_core::model::{Model, signals};
-use loopsight_core::run::Run;
 use loopsight_core::{Channel, Place, Role};
+use loopsight_model::model::{Model, signals};
+use loopsight_model::run::Run;
 use nalgebra::DMatrix;
 
 use super::filter::Filtered;

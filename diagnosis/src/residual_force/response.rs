@@ -1,9 +1,10 @@
 //! How a force that is not in the model would show in the filter's innovations.
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
-use loopsight_core::simulate::Simulator;
-use loopsight_core::{DUAL_WIDTH, Dual, Place, Real, derivative, variable};
+use loopsight_core::{Place, Real};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+use loopsight_model::simulate::Simulator;
+use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 

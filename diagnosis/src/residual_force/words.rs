@@ -1,6 +1,6 @@
 //! The residual force in words, and its expression as TOML.
 
-use loopsight_core::expression::{EffectDraft, ParameterDraft};
+use loopsight_model::expression::{EffectDraft, ParameterDraft};
 
 use super::dependence::Dependence;
 use super::place::{Group, Law};

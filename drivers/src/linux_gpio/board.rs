@@ -7,8 +7,8 @@ use std::thread::{JoinHandle, park_timeout};
 use std::time::Duration;
 
 use embedded_hal::digital::OutputPin;
-use loopsight_core::registry::HostDriverError;
 use loopsight_core::{Clock, Driver, DriverError as _, DriverFault, Sample};
+use loopsight_model::registry::HostDriverError;
 
 use super::LinuxGpio;
 use super::bridge::{BoardBridge, BoardPin, Lines};

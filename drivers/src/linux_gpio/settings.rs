@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use loopsight_core::model::Model;
-use loopsight_core::registry::BuildError;
-use loopsight_core::sensor::Sensor;
+use loopsight_model::model::Model;
+use loopsight_model::registry::BuildError;
+use loopsight_model::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
 use crate::robot::unknown;

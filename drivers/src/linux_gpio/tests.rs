@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use embedded_hal::digital::{ErrorKind, ErrorType, OutputPin, PinState};
-use loopsight_core::config::Source;
-use loopsight_core::model::Model;
-use loopsight_core::registry::BuildError;
 use loopsight_core::{Clock, Driver as _, DriverFault};
+use loopsight_model::config::Source;
+use loopsight_model::model::Model;
+use loopsight_model::registry::BuildError;
 use tempfile::TempDir;
 
 use super::board::{Board, Plan};

@@ -104,8 +104,9 @@ impl core::error::Error for KalmanError {}
 
 #[cfg(feature = "std")]
 mod part {
-    use loopsight_core::registry::{BuildError, EstimatorPart, PartMeta, Setting};
-    use loopsight_core::{Estimator, declare_part};
+    use loopsight_core::Estimator;
+    use loopsight_model::declare_part;
+    use loopsight_model::registry::{BuildError, EstimatorPart, PartMeta, Setting};
     use nalgebra::DVector;
 
     use super::KalmanSettings;

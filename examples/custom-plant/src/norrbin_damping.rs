@@ -1,8 +1,7 @@
 //! What the water does to a hull that turns fast.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
+use loopsight_model::declare_effect;
 
 /// Norrbin's damping: a force against the motion that grows with the cube of the speed.
 ///

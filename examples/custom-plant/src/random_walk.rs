@@ -1,7 +1,8 @@
 //! Parameters that may change while they are learned.
 
-use loopsight_core::registry::{BuildError, EstimatorPart, PartMeta, Setting};
-use loopsight_core::{Estimator, Innovation, declare_part};
+use loopsight_core::{Estimator, Innovation};
+use loopsight_model::declare_part;
+use loopsight_model::registry::{BuildError, EstimatorPart, PartMeta, Setting};
 use serde::{Deserialize, Serialize};
 
 /// A Kalman filter for parameters that walk at random.

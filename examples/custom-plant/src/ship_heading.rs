@@ -2,8 +2,8 @@
 
 use loopsight_core::{
     Channel, Parameter, Parameterization, Place, Plant, PlantMeta, Reads, Real, Role, Signal,
-    declare_plant,
 };
+use loopsight_model::declare_plant;
 
 /// The heading of a ship at constant speed.
 ///

@@ -5,10 +5,11 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::{TcpStream, ToSocketAddrs as _};
 use std::time::{Duration, Instant};
 
-use loopsight_core::registry::{
+use loopsight_core::{Driver, DriverFault, Sample};
+use loopsight_model::declare_part;
+use loopsight_model::registry::{
     BuildError, DriverContext, DriverPart, HostDriver, HostDriverError, PartMeta, Setting,
 };
-use loopsight_core::{Driver, DriverFault, Sample, declare_part};
 use serde::{Deserialize, Serialize};
 
 /// A robot behind a TCP connection, one line of text for each question and each answer.

@@ -1,8 +1,9 @@
 //! A helmsman who knows three rudder angles.
 
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, ControllerPart, PartMeta, Setting};
-use loopsight_core::{AffineModel, Command, ControlError, Controller, Tick, declare_part};
+use loopsight_core::{AffineModel, Command, ControlError, Controller, Tick};
+use loopsight_model::declare_part;
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, ControllerPart, PartMeta, Setting};
 use serde::{Deserialize, Serialize};
 
 /// Three-position control: each input is at plus or minus its level, or at 0.

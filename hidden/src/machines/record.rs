@@ -1,6 +1,6 @@
 //! Making a recording of a machine with one command.
 
-use loopsight_core::run::Run;
+use loopsight_model::run::Run;
 
 use super::Sheet;
 use crate::error::HiddenError;

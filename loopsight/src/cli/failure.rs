@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use loopsight_core::config::{ConfigError, ReadError};
-use loopsight_core::model::ModelError;
 use loopsight_diagnosis::{CompareError, FitError};
+use loopsight_model::config::{ConfigError, ReadError};
+use loopsight_model::model::ModelError;
 use loopsight_recordings::RecordingError;
 use loopsight_report::ReportError;
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource};

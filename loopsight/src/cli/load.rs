@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use loopsight_core::Signal;
-use loopsight_core::config::{Source, nearest};
-use loopsight_core::model::Model;
-use loopsight_core::registry::BuildError;
-use loopsight_core::run::Run;
 use loopsight_core::unit;
+use loopsight_model::config::{Source, nearest};
+use loopsight_model::model::Model;
+use loopsight_model::registry::BuildError;
+use loopsight_model::run::Run;
 use loopsight_recordings::{Fault, RecordingError, Severity};
 
 use crate::cli::failure::{self, Failure};

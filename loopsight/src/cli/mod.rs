@@ -49,7 +49,7 @@ pub fn run() -> ExitCode {
 }
 
 fn execute(arguments: &Arguments) -> Result<(), Failure> {
-    loopsight_core::registry::check().map_err(|e| Failure::work(e.to_string()))?;
+    loopsight_model::registry::check().map_err(|e| Failure::work(e.to_string()))?;
     match &arguments.command {
         Command::New(options) => commands::new::run(options),
         Command::Check(options) => commands::check::run(options),

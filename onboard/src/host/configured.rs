@@ -2,11 +2,11 @@
 
 use heapless::{String, Vec};
 use loopsight_core::learning::Range;
-use loopsight_core::model::Model;
-use loopsight_core::registry::BuildError;
 use loopsight_core::{Place, PlantMeta};
 use loopsight_estimators::{Forgetting, Rls, RlsSettings};
 use loopsight_link::{Attachment, Configuration, ControllerGains, Learning, NAME, SIGNALS, Values};
+use loopsight_model::model::Model;
+use loopsight_model::registry::BuildError;
 use nalgebra::DVector;
 
 use super::Aboard;
@@ -151,7 +151,7 @@ impl Aboard {
 fn attachment(
     model: &Model,
     plant: &PlantMeta,
-    attached: &loopsight_core::model::Attached,
+    attached: &loopsight_model::model::Attached,
 ) -> Result<Attachment, BuildError> {
     let id = attached.meta.id;
     let wrong = |what: &str| {

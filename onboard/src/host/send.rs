@@ -2,10 +2,10 @@
 
 use std::any::Any;
 
-use loopsight_core::loop_file::LoopFile;
-use loopsight_core::model::Model;
-use loopsight_core::registry::BuildError;
 use loopsight_link::Configuration;
+use loopsight_model::loop_file::LoopFile;
+use loopsight_model::model::Model;
+use loopsight_model::registry::BuildError;
 
 use super::conversation::Conversation;
 use super::{Aboard, Line, LineError, Serial};

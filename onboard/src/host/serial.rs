@@ -3,15 +3,15 @@
 use std::any::Any;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use loopsight_core::registry::{
+use loopsight_core::{
+    AffineModel, Command, ControlError, Controller, Driver, DriverFault, Quantity, Sample, Tick,
+};
+use loopsight_link::Act;
+use loopsight_model::declare_part;
+use loopsight_model::registry::{
     BuildError, ControllerPart, DriverContext, DriverPart, HalfError, Halves, HostDriver,
     HostDriverError, PartMeta, Setting,
 };
-use loopsight_core::{
-    AffineModel, Command, ControlError, Controller, Driver, DriverFault, Quantity, Sample, Tick,
-    declare_part,
-};
-use loopsight_link::Act;
 use serde::{Deserialize, Serialize};
 
 use super::conversation::Conversation;

@@ -1,8 +1,8 @@
 //! What a robot tells of itself beside its commands.
 
-use loopsight_core::model::Model;
 use loopsight_core::{Command, Quantity};
 use loopsight_link::Act;
+use loopsight_model::model::Model;
 
 /// What the robot learned and, where it has sensors of its own, its supply.
 #[derive(Debug)]

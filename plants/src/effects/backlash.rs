@@ -1,8 +1,7 @@
 //! Play in a gear.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 use super::first_order;
 

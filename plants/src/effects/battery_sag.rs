@@ -1,8 +1,7 @@
 //! A supply that is not stiff.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Battery sag: the supply falls with the current that all motors take, and every command with it.
 ///

@@ -1,8 +1,7 @@
 //! A centre of mass that is not over the axle.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// The centre of mass off the axle: turning pushes the vehicle forward, and driving resists
 /// turning.

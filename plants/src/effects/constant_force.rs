@@ -1,6 +1,7 @@
 //! A force that never changes.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
 /// A constant force: gravity on a lift, a counterweight, a spring of constant force.
 ///

@@ -1,8 +1,7 @@
 //! A spring that hardens.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// A spring that hardens: a force towards rest that grows with the cube of the way from it.
 ///

@@ -1,6 +1,7 @@
 //! A threshold in the actuator.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
 /// Dead zone: commands below a threshold do nothing, and others lose it.
 ///
@@ -57,7 +58,7 @@ mod tests {
 
     use super::*;
 
-    use loopsight_core::{Dual, derivative, variable};
+    use loopsight_model::{Dual, derivative, variable};
 
     #[test]
     fn takes_the_threshold_and_no_more() {

@@ -1,8 +1,7 @@
 //! Friction that depends on the direction.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Friction that differs forwards and backwards.
 ///

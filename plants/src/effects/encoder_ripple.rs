@@ -1,8 +1,7 @@
 //! An encoder disc that is off its centre.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Encoder ripple: an eccentric disc counts the angle unevenly, once per turn.
 ///

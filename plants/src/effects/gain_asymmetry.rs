@@ -1,6 +1,7 @@
 //! Motors that are not equal.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
 /// Gain asymmetry: one motor is stronger than the other.
 ///

@@ -1,6 +1,7 @@
 //! Transport delay of a command.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
 /// Input delay: the command arrives later than it was logged.
 ///

@@ -1,6 +1,7 @@
 //! A bias of the actuator.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
 /// Input offset: something is added to every command.
 ///

@@ -1,6 +1,7 @@
 //! An actuator at its limit.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
 /// Saturation: the actuator gives no more than a limit, below the nominal one.
 ///

@@ -1,8 +1,7 @@
 //! A load that is taken up or set down.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Payload change: from an unknown time on the mass and the inertia are others.
 ///

@@ -1,8 +1,7 @@
 //! Drag of air or water.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Quadratic drag: a force against the motion that grows with the square of the speed.
 ///

@@ -1,8 +1,7 @@
 //! Friction of turning on the spot.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Scrub: dry friction of tyres and castors that are dragged sideways when a vehicle turns.
 ///

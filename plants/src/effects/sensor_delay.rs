@@ -1,6 +1,7 @@
 //! A measurement that comes late.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
 /// Sensor delay: the number in the log is an old one.
 ///

@@ -1,6 +1,7 @@
 //! A bias of the sensor.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
 /// Sensor offset: the sensor reads something at zero.
 ///

@@ -1,6 +1,7 @@
 //! A sensor with a wrong scale.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
 /// Sensor scale: the sensor reads too much, or too little, in proportion.
 ///

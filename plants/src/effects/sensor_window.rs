@@ -1,6 +1,7 @@
 //! A sensor that averages.
 
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, declare_effect};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
 /// Sensor window: the sensor reports a moving mean.
 ///

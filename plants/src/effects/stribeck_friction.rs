@@ -1,8 +1,7 @@
 //! Dry friction with a breakaway.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Stribeck friction: dry friction that is higher at breakaway than in motion.
 ///

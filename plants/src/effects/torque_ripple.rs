@@ -1,8 +1,7 @@
 //! Cogging and everything else that is uneven around a turn.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Torque ripple: a force that goes up and down with the angle of the shaft, a few times per turn.
 ///

@@ -1,8 +1,7 @@
 //! Friction of lubricated bearings.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Viscous friction: a force against the motion, proportional to the speed.
 ///

@@ -1,8 +1,7 @@
 //! Wheels of different size.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Wheels of different size: odometry that takes them for equal turns straight runs into arcs.
 ///

@@ -1,8 +1,7 @@
 //! The limit of traction.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Wheel slip: the ground takes no more than the traction limit; what exceeds it spins the wheel up.
 ///

@@ -1,8 +1,7 @@
 //! A motor that warms up.
 
-use loopsight_core::{
-    Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
-};
+use crate::declare_effect;
+use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
 /// Winding heating: what a winding loses warms it, its resistance grows, and the current falls.
 ///

@@ -9,13 +9,14 @@
 
 mod mistakes;
 
-use loopsight_core::expression::{EffectDraft, ParameterDraft};
-use loopsight_core::model::Model;
-use loopsight_core::registry::{HostReal, effects};
-use loopsight_core::run::Run;
-use loopsight_core::sensor::Sensor;
-use loopsight_core::simulate::{Simulator, free_run};
-use loopsight_core::{AffineModel, Dual, Place, Real, Role, derivative, variable};
+use loopsight_core::{AffineModel, Place, Real, Role};
+use loopsight_model::expression::{EffectDraft, ParameterDraft};
+use loopsight_model::model::Model;
+use loopsight_model::registry::{HostReal, effects};
+use loopsight_model::run::Run;
+use loopsight_model::sensor::Sensor;
+use loopsight_model::simulate::{Simulator, free_run};
+use loopsight_model::{Dual, derivative, variable};
 use loopsight_plants as _;
 
 const TWIL: &str = "[plant.ddmr]
@@ -144,7 +145,7 @@ fn same(of: &str, ours: &Model, library: &Model, of_parameters: &[(&str, &str)])
 
     let seeded = |model: &Model, names: Vec<&str>| -> Vec<Dual> {
         let index = |name: &str| names.iter().position(|n| *n == name);
-        let seed = |p: &loopsight_core::model::ModelParameter| {
+        let seed = |p: &loopsight_model::model::ModelParameter| {
             let value = p.value.unwrap();
             index(&p.name).map_or_else(|| Dual::of(value), |i| variable(value, i))
         };
@@ -309,7 +310,7 @@ area = { value = 0.3, unit = \"m^2\", held = true }
     assert!((moved[999][0] - still[999][0]).abs() > 1e-3);
     let fitting = |plant: &'static loopsight_core::PlantMeta| {
         let fits = |e: &&loopsight_core::EffectMeta| {
-            let fits = |c| loopsight_core::model::misfit(c, e).is_none();
+            let fits = |c| loopsight_model::model::misfit(c, e).is_none();
             plant.channels.iter().any(fits)
         };
         effects().into_iter().filter(fits).count()

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use loopsight_core::model::{Model, ModelError};
+use loopsight_model::model::{Model, ModelError};
 
 use super::{AXIS, OWN_FRICTION};
 

@@ -1,7 +1,7 @@
 //! What drives a signal: the input or the combination of inputs that ought to move it.
 
-use loopsight_core::run::Run;
 use loopsight_core::unit::parse;
+use loopsight_model::run::Run;
 
 use crate::map::MeasuredSignal;
 

@@ -1,6 +1,6 @@
 //! Sensors, inputs and whole logs that stand still.
 
-use loopsight_core::run::Run;
+use loopsight_model::run::Run;
 
 use super::drive::Drive;
 use super::{extent, moves, signal};

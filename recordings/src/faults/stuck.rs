@@ -1,6 +1,6 @@
 //! Sensors that die in the middle of a run.
 
-use loopsight_core::run::Run;
+use loopsight_model::run::Run;
 
 use super::drive::Drive;
 use super::{extent, large, moves};

@@ -2,9 +2,9 @@
 
 use std::hint::black_box;
 
-use loopsight_core::model::Model;
-use loopsight_core::simulate::Simulator;
-use loopsight_core::{Dual, variable};
+use loopsight_model::model::Model;
+use loopsight_model::simulate::Simulator;
+use loopsight_model::{Dual, variable};
 
 use super::{PAPER, STEPS, in_turns};
 
@@ -61,7 +61,7 @@ pub(super) fn expressions(ratios: bool) {
     ] {
         let models = [model(&own), model(&library)];
         let nu = models[0].plant.inputs.len();
-        fn drive<S: loopsight_core::registry::HostReal>(
+        fn drive<S: loopsight_model::registry::HostReal>(
             simulator: &mut Simulator<'_, S>,
             nu: usize,
             calls: usize,

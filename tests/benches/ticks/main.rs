@@ -19,10 +19,10 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::Criterion;
-use loopsight_core::model::Model;
-use loopsight_core::simulate::Simulator;
 use loopsight_core::{Estimator, Real};
 use loopsight_estimators::{Rls, RlsSettings};
+use loopsight_model::model::Model;
+use loopsight_model::simulate::Simulator;
 use loopsight_plants as _;
 use nalgebra::{DVector, SVector};
 

@@ -10,14 +10,13 @@ mod parts;
 
 use std::collections::BTreeSet;
 
-use loopsight_core::model::{Model, misfit, signals};
-use loopsight_core::registry::{effects, parts, plants};
-use loopsight_core::sensor::Sensor;
-use loopsight_core::simulate::Simulator;
 use loopsight_core::unit::parse;
-use loopsight_core::{
-    Dual, EffectMeta, Parameter, Place, PlaceKind, PlantMeta, Real, Signal, derivative, variable,
-};
+use loopsight_core::{EffectMeta, Parameter, Place, PlaceKind, PlantMeta, Real, Signal};
+use loopsight_model::model::{Model, misfit, signals};
+use loopsight_model::registry::{effects, parts, plants};
+use loopsight_model::sensor::Sensor;
+use loopsight_model::simulate::Simulator;
+use loopsight_model::{Dual, derivative, variable};
 
 fn said(of: &str, what: &str, text: &str) {
     assert!(!text.trim().is_empty(), "{of}: the {what} is empty");
@@ -75,7 +74,7 @@ fn check_signals(of: &str, list: &[Signal]) {
 
 #[test]
 fn something_is_linked_and_nothing_twice() {
-    assert!(loopsight_core::registry::duplicates().is_empty());
+    assert!(loopsight_model::registry::duplicates().is_empty());
     for (what, n) in [
         ("plants", plants().len()),
         ("effects", effects().len()),
@@ -122,7 +121,7 @@ fn plants_keep_their_word() {
             let key = meta.parameters.iter().find(|p| p.id == set.id);
             assert!(key.is_none(), "{of}: also the name of a parameter");
         }
-        for quantity in loopsight_core::registry::derived(meta.id) {
+        for quantity in loopsight_model::registry::derived(meta.id) {
             said(&of, quantity.id, quantity.equation);
             said(&of, quantity.id, quantity.doc);
             unit(&of, quantity.unit);
@@ -265,7 +264,7 @@ fn lively(parameter: &Parameter) -> f64 {
 }
 
 /// All signals of the plant that a sensor could read, driven for half a second.
-fn trajectory<S: loopsight_core::registry::HostReal>(model: &Model, values: &[S]) -> Vec<S> {
+fn trajectory<S: loopsight_model::registry::HostReal>(model: &Model, values: &[S]) -> Vec<S> {
     let mut simulator = Simulator::new(model, values);
     let nu = model.plant.inputs.len();
     let start = vec![0.0; nu];

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use loopsight_core::model::Model;
-use loopsight_core::registry::{
+use loopsight_model::model::Model;
+use loopsight_model::registry::{
     BuildError, ControllerPart, DriverContext, DriverPart, EffectPart, EstimatorPart, PartMeta,
     PlantPart, parts, plants, written,
 };
-use loopsight_core::run::Run;
+use loopsight_model::run::Run;
 use loopsight_tests::{recording, twil};
 
 use super::{derivatives_agree, distinct, said, snake_case, unit};

@@ -12,17 +12,17 @@ use std::collections::BTreeMap;
 use std::fmt::Debug;
 
 use loopsight_core::Parameter;
-use loopsight_core::config::Source;
-use loopsight_core::excitation::{Between, Excitation};
-use loopsight_core::identification::LearningSettings;
-use loopsight_core::loop_file::LoopFile;
-use loopsight_core::model::{FitOptions, Model, ModelFile, SimulationOptions, misfit};
-use loopsight_core::registry::{
+use loopsight_model::config::Source;
+use loopsight_model::excitation::{Between, Excitation};
+use loopsight_model::identification::LearningSettings;
+use loopsight_model::loop_file::LoopFile;
+use loopsight_model::model::{FitOptions, Model, ModelFile, SimulationOptions, misfit};
+use loopsight_model::registry::{
     ControllerPart, DriverPart, EstimatorPart, effects, parts as linked, plants,
 };
-use loopsight_core::regression::Scheme;
-use loopsight_core::run::{Column, ColumnMap, Hold, LogMap, Measured};
-use loopsight_core::sensor::{Encoder, Sensor};
+use loopsight_model::regression::Scheme;
+use loopsight_model::run::{Column, ColumnMap, Hold, LogMap, Measured};
+use loopsight_model::sensor::{Encoder, Sensor};
 use loopsight_plants as _;
 use loopsight_tests as _;
 use parts::{controller, driver, estimator, limits, supervisor};

@@ -1,11 +1,11 @@
 //! Parts of loops as they may stand in a file.
 
 use loopsight_controllers::{FeedbackLinearizingPiSettings, PerChannel, Rule};
-use loopsight_core::limits::SignalLimits;
-use loopsight_core::registry::DriverPart;
-use loopsight_core::supervisor::SupervisorSettings;
 use loopsight_drivers::{Limit, Replay, SensorFault, Simulated};
 use loopsight_estimators::{Forgetting, RlsSettings};
+use loopsight_model::limits::SignalLimits;
+use loopsight_model::registry::DriverPart;
+use loopsight_model::supervisor::SupervisorSettings;
 use proptest::collection::{btree_map, vec};
 use proptest::option;
 use proptest::prelude::*;

@@ -1,8 +1,8 @@
 //! `loopsight add`.
 
-use loopsight_core::config::nearest;
-use loopsight_core::model::{Model, misfit};
-use loopsight_core::registry;
+use loopsight_model::config::nearest;
+use loopsight_model::model::{Model, misfit};
+use loopsight_model::registry;
 
 use crate::cli::arguments::AddOptions;
 use crate::cli::failure::Failure;

@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use bench::{Bench, Motion};
 use judge::{SEEN, judge, looks};
-use loopsight_core::config::{Source, read_text};
-use loopsight_core::loop_file::LoopFile;
-use loopsight_core::model::{Model, pseudo_inverse};
-use loopsight_core::sensor::Sensor;
+use loopsight_model::config::{Source, read_text};
+use loopsight_model::loop_file::LoopFile;
+use loopsight_model::model::{Model, pseudo_inverse};
+use loopsight_model::sensor::Sensor;
 use nalgebra::DMatrix;
 use person::Person;
 

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use loopsight_core::config::{Source, read_text};
-use loopsight_core::loop_file::LoopFile;
-use loopsight_core::model::Model;
+use loopsight_model::config::{Source, read_text};
+use loopsight_model::loop_file::LoopFile;
+use loopsight_model::model::Model;
 
 use crate::cli::arguments::CheckOptions;
 use crate::cli::commands::run::compose;

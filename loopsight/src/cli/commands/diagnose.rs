@@ -1,8 +1,8 @@
 //! `loopsight diagnose`.
 
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
 use loopsight_diagnosis::{Comparison, Conclusion, Diagnosis, Explanation, compare, diagnose};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_report::{Context, diagnosis_page, save};
 
 use crate::cli::arguments::DiagnoseOptions;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use loopsight_core::model::Model;
 use loopsight_diagnosis::{Limits, Plan, Promise, Question, QuestionError, experiment, place};
+use loopsight_model::model::Model;
 use loopsight_recordings::{header, write_csv};
 use serde::Serialize;
 

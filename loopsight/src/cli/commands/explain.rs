@@ -1,9 +1,9 @@
 //! `loopsight explain`.
 
-use loopsight_core::config::nearest;
-use loopsight_core::model::misfit;
-use loopsight_core::registry::{self, PartMeta, range_text};
 use loopsight_core::{EffectMeta, Parameter, PlantMeta, Signal};
+use loopsight_model::config::nearest;
+use loopsight_model::model::misfit;
+use loopsight_model::registry::{self, PartMeta, range_text};
 
 use crate::cli::arguments::ExplainOptions;
 use crate::cli::failure::Failure;

@@ -2,8 +2,8 @@
 
 use indicatif::ProgressBar;
 use loopsight_core::Parameter;
-use loopsight_core::config::Step;
 use loopsight_diagnosis::{Fit, FitSettings, Method, Scheme, fit};
+use loopsight_model::config::Step;
 use loopsight_report::{Context, fit_page, save};
 
 use crate::cli::arguments::{FitOptions, MethodName, SchemeName};

@@ -1,8 +1,8 @@
 //! `loopsight improve`.
 
-use loopsight_core::config::{Source, Step};
-use loopsight_core::model::{Attached, Model, ModelParameter};
 use loopsight_diagnosis::{Improvement, improve};
+use loopsight_model::config::{Source, Step};
+use loopsight_model::model::{Attached, Model, ModelParameter};
 use loopsight_report::{improvement_page, save};
 
 use crate::cli::arguments::ImproveOptions;

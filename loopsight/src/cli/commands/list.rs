@@ -1,6 +1,6 @@
 //! `loopsight list`.
 
-use loopsight_core::registry;
+use loopsight_model::registry;
 use serde::Serialize;
 
 use crate::cli::arguments::{ListOptions, RoleName};

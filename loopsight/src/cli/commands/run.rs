@@ -11,10 +11,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use dashboard::Dashboard;
 use loopsight_core::TickError;
-use loopsight_core::config::{Source, read_text};
-use loopsight_core::loop_file::{Composed, LoopFile};
-use loopsight_core::model::Model;
-use loopsight_core::registry::{BuildError, DriverContext};
+use loopsight_model::config::{Source, read_text};
+use loopsight_model::loop_file::{Composed, LoopFile};
+use loopsight_model::model::Model;
+use loopsight_model::registry::{BuildError, DriverContext};
 use loopsight_recordings::{LogWriter, RecordingError};
 use loopsight_report::{Context, LoopRecord, figure_svg, run_figure, run_page, save};
 use recorder::Recorder;

@@ -1,8 +1,8 @@
 //! `loopsight send`.
 
-use loopsight_core::config::{Source, read_text};
-use loopsight_core::loop_file::{LoopFile, placed};
-use loopsight_core::model::{Attached, Model};
+use loopsight_model::config::{Source, read_text};
+use loopsight_model::loop_file::{LoopFile, placed};
+use loopsight_model::model::{Attached, Model};
 use loopsight_onboard::{Acknowledged, Attachment, SendError};
 use serde::Serialize;
 

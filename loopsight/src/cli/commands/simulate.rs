@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use loopsight_core::config::{ConfigError, Source, read_text};
-use loopsight_core::excitation::{self, Excitation, sample_rows};
-use loopsight_core::loop_file::placed;
-use loopsight_core::model::Model;
-use loopsight_core::run::Run;
 use loopsight_drivers::{Simulated, simulate_inputs};
+use loopsight_model::config::{ConfigError, Source, read_text};
+use loopsight_model::excitation::{self, Excitation, sample_rows};
+use loopsight_model::loop_file::placed;
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_recordings::{header, write_csv};
 use serde::Deserialize;
 

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use loopsight_core::model::Model;
-use loopsight_core::registry::HostDriver;
-use loopsight_core::simulate::Simulator;
 use loopsight_core::{Clock, Driver as _, Limits};
+use loopsight_model::model::Model;
+use loopsight_model::registry::HostDriver;
+use loopsight_model::simulate::Simulator;
 
 use crate::cli::failure::Failure;
 use crate::cli::output;
@@ -226,8 +226,8 @@ impl Drop for Bench<'_> {
 mod tests {
     use std::sync::Mutex;
 
-    use loopsight_core::registry::HostDriverError;
     use loopsight_core::{Driver, DriverFault, Sample};
+    use loopsight_model::registry::HostDriverError;
 
     use super::*;
 

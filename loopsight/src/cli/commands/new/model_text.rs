@@ -1,9 +1,9 @@
 //! `model.toml` of a new robot, from what its plant declares.
 
-use loopsight_core::config::Step;
-use loopsight_core::model::{Model, misfit};
-use loopsight_core::registry::{self, range_text};
 use loopsight_core::{Parameter, PlaceKind, PlantMeta, Signal};
+use loopsight_model::config::Step;
+use loopsight_model::model::{Model, misfit};
+use loopsight_model::registry::{self, range_text};
 
 use super::pace::Pace;
 use super::texts::{program, quoted};

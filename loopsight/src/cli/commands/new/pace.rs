@@ -1,8 +1,9 @@
 //! How fast a plant moves, for an experiment that suits it.
 
-use loopsight_core::model::Model;
-use loopsight_core::simulate::Simulator;
-use loopsight_core::{Dual, Real, derivative, variable};
+use loopsight_core::Real;
+use loopsight_model::model::Model;
+use loopsight_model::simulate::Simulator;
+use loopsight_model::{Dual, derivative, variable};
 use nalgebra::{DMatrix, Schur};
 
 /// The time constants `1/|λ|` of a plant, s: `λ` are the eigenvalues of its equations, linearised

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use loopsight_core::config::{Source, nearest};
-use loopsight_core::loop_file::LoopFile;
-use loopsight_core::model::Model;
-use loopsight_core::registry;
-use loopsight_core::run::Run;
 use loopsight_core::{PlantMeta, Signal};
+use loopsight_model::config::{Source, nearest};
+use loopsight_model::loop_file::LoopFile;
+use loopsight_model::model::Model;
+use loopsight_model::registry;
+use loopsight_model::run::Run;
 
 use super::folder::Folder;
 use super::model_text::model_text;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use loopsight_core::config::read_text;
+use loopsight_model::config::read_text;
 
 use super::folder::Folder;
 use crate::cli::failure::Failure;
@@ -92,7 +92,7 @@ pub(super) fn write(target: &Path, loopsight: Option<&Path>) -> Result<(), Failu
 
 /// Names that cargo or Rust keeps for itself; keywords are refused by cargo with a message of its
 /// own.
-const RESERVED: [&str; 8] = [
+const RESERVED: [&str; 9] = [
     "alloc",
     "build",
     "core",
@@ -100,6 +100,7 @@ const RESERVED: [&str; 8] = [
     "std",
     "test",
     "loopsight-core",
+    "loopsight-model",
     "loopsight",
 ];
 
@@ -138,9 +139,14 @@ fn checkout(named: Option<&Path>) -> Result<PathBuf, Failure> {
         Some(path) => path.to_owned(),
         None => Path::new(BUILT_FROM).join(".."),
     };
-    let lacking = ["core/Cargo.toml", "loopsight/Cargo.toml", "Cargo.lock"]
-        .into_iter()
-        .find(|file| !path.join(file).is_file());
+    let lacking = [
+        "core/Cargo.toml",
+        "model/Cargo.toml",
+        "loopsight/Cargo.toml",
+        "Cargo.lock",
+    ]
+    .into_iter()
+    .find(|file| !path.join(file).is_file());
     let found = match lacking {
         None => path.canonicalize().map_err(|e| e.to_string()),
         Some(file) => Err(format!("there is no {}", path.join(file).display())),
@@ -174,6 +180,8 @@ publish = false
 [dependencies]
 # What the equations are written with.
 loopsight-core = {{ path = {} }}
+# What makes them known to files and commands: the registry.
+loopsight-model = {{ path = {} }}
 # The command `loopsight` with all that ships, for the parts of this crate to join.
 loopsight = {{ path = {} }}
 
@@ -186,6 +194,7 @@ opt-level = 2
 debug = "line-tables-only"
 "#,
         path("core"),
+        path("model"),
         path("loopsight")
     )
 }

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::loop_file::Composed;
-use loopsight_core::model::Model;
-use loopsight_core::supervisor::{Event, described, turning};
+use loopsight_core::supervisor::Event;
 use loopsight_core::{Signal, Step};
+use loopsight_model::loop_file::Composed;
+use loopsight_model::model::Model;
+use loopsight_model::supervisor::{described, turning};
 use loopsight_recordings::{column, header};
 use loopsight_report::{ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace};
 

@@ -1,0 +1,303 @@
+//! Effects bound to the channels of a plant.
+
+use std::collections::BTreeMap;
+
+use crate::config::{ConfigError, Source, Step, nearest};
+use crate::model::{Attached, Model, ModelParameter, signal_index, signals};
+use crate::registry::{EffectPart, ReadyEffect};
+use loopsight_core::{Channel, EffectMeta, PlantMeta, Role};
+
+/// Binds the effect `part`, the `index`-th of the file, to its channels and adds its parameters.
+pub(crate) fn attach(
+    plant: &'static PlantMeta,
+    part: &dyn EffectPart,
+    index: usize,
+    parameters: &mut Vec<ModelParameter>,
+    source: &Source,
+) -> Result<Attached, Box<ConfigError>> {
+    let meta = part.meta();
+    let base: Vec<Step> = vec!["effect".into(), index.into(), meta.id.into()];
+    let path = |more: &[Step]| -> Vec<Step> { base.iter().chain(more).cloned().collect() };
+    if part.at().is_empty() {
+        let fitting = fitting_channels(plant, meta);
+        return Err(source.error(
+            &base,
+            &format!("`{}` needs `at`: the channels it acts on", meta.id),
+            Some(format!(
+                "channels of `{}` where it fits: {}",
+                plant.id,
+                fitting.join(", ")
+            )),
+        ));
+    }
+    let mut at = Vec::new();
+    for (i, id) in part.at().iter().enumerate() {
+        let channel = plant
+            .channels
+            .iter()
+            .find(|c| c.id == id.as_str())
+            .ok_or_else(|| {
+                let ids: Vec<&str> = plant.channels.iter().map(|c| c.id).collect();
+                source.error(
+                    &path(&[part.at_key().into(), i.into()]),
+                    &format!(
+                        "the plant `{}` has no channel `{id}`, expected one of {}",
+                        plant.id,
+                        ids.join(", ")
+                    ),
+                    nearest(id, ids).map(|n| format!("did you mean `{n}`?")),
+                )
+            })?;
+        at.push(channel);
+    }
+    let ready = part
+        .ready(plant, &at)
+        .map_err(|mistake| source.mistake(&base, mistake))?;
+    for (i, channel) in at.iter().enumerate() {
+        if let Some(why) = misfit(channel, ready.meta) {
+            let fitting = fitting_channels(plant, ready.meta);
+            return Err(source.error(
+                &path(&[part.at_key().into(), i.into()]),
+                &format!("`{}` cannot act on `{}`: {why}", meta.id, channel.id),
+                Some(format!("channels where it fits: {}", fitting.join(", "))),
+            ));
+        }
+    }
+    Ok(bind(plant, ready, at, &base, parameters))
+}
+
+/// Binds an effect to channels that it fits; its table stands at `base`.
+fn bind(
+    plant: &'static PlantMeta,
+    ready: ReadyEffect,
+    at: Vec<&'static Channel>,
+    base: &[Step],
+    parameters: &mut Vec<ModelParameter>,
+) -> Attached {
+    let meta = ready.meta;
+    let first_parameter = parameters.len();
+    let declared = meta
+        .parameters
+        .iter()
+        .zip(ready.given.iter().zip(ready.paths));
+    for (declaration, (given, path)) in declared {
+        let (unit, size) = at.first().map_or_else(
+            || (declaration.unit.to_owned(), 1.0),
+            |channel| unit_at(declaration.unit, channel, plant),
+        );
+        let acts =
+            declaration.sides.is_empty() || at.iter().any(|c| declaration.sides.contains(&c.side));
+        parameters.push(ModelParameter {
+            name: format!("{}.{}", meta.id, declaration.id),
+            declaration,
+            unit,
+            value: given.or(declaration.default.map(|d| d * size)),
+            free: declaration.estimated && acts,
+            size,
+            path: base.iter().cloned().chain(path).collect(),
+        });
+    }
+    let reads = at.iter().map(|channel| {
+        let mut bound = [None; Role::COUNT];
+        for role in meta.reads {
+            bound[*role as usize] = channel.read(*role).and_then(|s| signal_index(plant, s));
+        }
+        bound
+    });
+    Attached {
+        meta,
+        reads: reads.collect(),
+        at,
+        first_parameter,
+        physics: ready.physics,
+        signals: ready.signals,
+    }
+}
+
+impl Model {
+    /// The model with the effect `id` added at the channels `at`, with the effect's default
+    /// parameters. `None` when there is no such effect or it does not fit one of the channels.
+    pub fn with_effect(&self, id: &str, at: &[&str]) -> Option<Model> {
+        let ready = crate::registry::effect(id)?;
+        let channels: Option<Vec<&'static Channel>> = at
+            .iter()
+            .map(|name| self.plant.channels.iter().find(|c| c.id == *name))
+            .collect();
+        let channels = channels?;
+        let fits = |c: &&'static Channel| misfit(c, ready.meta).is_none();
+        if channels.is_empty() || !channels.iter().all(fits) {
+            return None;
+        }
+        let mut model = self.clone();
+        let base: [Step; 3] = [
+            "effect".into(),
+            model.effects.len().into(),
+            ready.meta.id.into(),
+        ];
+        let attached = bind(self.plant, ready, channels, &base, &mut model.parameters);
+        model.effects.push(attached);
+        make_names_unique(&mut model.parameters, &model.effects);
+        Some(model)
+    }
+}
+
+/// The unit of an effect's parameter at a channel, and what 1 of its default and scale is there:
+/// `channel`, `flow` and `position` are filled in.
+///
+/// `channel/flow^2` at a wheel is `V/(rad/s)^2`.
+pub fn unit_at(unit: &str, channel: &Channel, plant: &'static PlantMeta) -> (String, f64) {
+    let signal = |role| {
+        let index = channel.read(role).and_then(|id| signal_index(plant, id));
+        index
+            .and_then(|i| signals(plant).nth(i))
+            .map_or(("1", 1.0), |s| (s.unit, s.size))
+    };
+    let mut filled = unit.to_owned();
+    let mut total = 1.0;
+    for (word, (unit_here, size)) in [
+        ("channel", (channel.unit, channel.size)),
+        ("flow", signal(Role::Flow)),
+        ("position", signal(Role::Position)),
+    ] {
+        let Some((before, after)) = unit.split_once(word) else {
+            continue;
+        };
+        let power: i32 = after
+            .strip_prefix('^')
+            .and_then(|p| p.split([' ', '/']).next()?.parse().ok())
+            .unwrap_or(1);
+        let divides = before.ends_with('/');
+        total *= size.powi(if divides { -power } else { power });
+        let alone = !unit_here.contains(['/', ' ']) || (before.is_empty() && power == 1);
+        filled = if alone {
+            filled.replace(word, unit_here)
+        } else {
+            filled.replace(word, &format!("({unit_here})"))
+        };
+    }
+    (filled, total)
+}
+
+impl Model {
+    /// The model with its `index`-th effect replaced by the effect `id` at the channels `at`;
+    /// parameters of the same name keep their values.
+    pub fn with_effect_replaced(&self, index: usize, id: &str, at: &[&str]) -> Option<Model> {
+        self.with_effect_changed(index, |model, old| {
+            let first = model.parameters.len();
+            let mut model = model.with_effect(id, at)?;
+            for new in &mut model.parameters[first..] {
+                if let Some(from) = old.iter().find(|p| p.declaration.id == new.declaration.id) {
+                    new.value = from.value;
+                    new.free = from.free;
+                }
+            }
+            Some(model)
+        })
+    }
+
+    /// The model without its `index`-th effect.
+    pub fn without_effect(&self, index: usize) -> Option<Model> {
+        self.with_effect_changed(index, |model, _| Some(model))
+    }
+
+    /// The model with what `change` makes, in the place of its `index`-th effect, of the model up to
+    /// there and the effect's parameters.
+    fn with_effect_changed(
+        &self,
+        index: usize,
+        change: impl Fn(Model, &[ModelParameter]) -> Option<Model>,
+    ) -> Option<Model> {
+        self.effects.get(index)?;
+        let mut model = self.clone();
+        model.effects.clear();
+        model.parameters.truncate(self.n_plant_parameters);
+        for (k, effect) in self.effects.iter().enumerate() {
+            let first = effect.first_parameter;
+            let own = &self.parameters[first..first + effect.meta.parameters.len()];
+            if k == index {
+                model = change(model, own)?;
+            } else {
+                model.keep(effect, own);
+            }
+        }
+        make_names_unique(&mut model.parameters, &model.effects);
+        Some(model)
+    }
+
+    /// Takes an effect of another model over, with its parameters.
+    fn keep(&mut self, effect: &Attached, own: &[ModelParameter]) {
+        let mut kept = effect.clone();
+        kept.first_parameter = self.parameters.len();
+        self.parameters.extend_from_slice(own);
+        self.effects.push(kept);
+    }
+}
+
+/// Why an effect cannot act on a channel; `None` when it can.
+pub fn misfit(channel: &Channel, effect: &EffectMeta) -> Option<String> {
+    let kind = channel.place.kind();
+    if !effect.places.contains(&kind) {
+        let kinds: Vec<&str> = effect.places.iter().map(|p| p.name()).collect();
+        return Some(format!(
+            "it is a place of kind `{}`, expected `{}`",
+            kind.name(),
+            kinds.join("` or `")
+        ));
+    }
+    if effect.sided && channel.side == 0 {
+        return Some("it acts oppositely on two sides, and this channel has none".to_owned());
+    }
+    if let Some(role) = effect
+        .yields_to
+        .iter()
+        .find(|r| channel.read(**r).is_some())
+    {
+        return Some(format!(
+            "where there is a {} it is said more precisely without it",
+            role.name()
+        ));
+    }
+    effect
+        .reads
+        .iter()
+        .find(|role| channel.read(**role).is_none())
+        .map(|role| {
+            format!(
+                "the effect reads the {}, which this channel does not offer",
+                role.name()
+            )
+        })
+}
+
+fn fitting_channels(plant: &PlantMeta, effect: &EffectMeta) -> Vec<&'static str> {
+    plant
+        .channels
+        .iter()
+        .filter(|c| misfit(c, effect).is_none())
+        .map(|c| c.id)
+        .collect()
+}
+
+/// Two instances of one effect are told apart by their channels.
+pub(crate) fn make_names_unique(parameters: &mut [ModelParameter], effects: &[Attached]) {
+    let mut count: BTreeMap<&str, usize> = BTreeMap::new();
+    for effect in effects {
+        *count.entry(effect.meta.id).or_default() += 1;
+    }
+    for effect in effects {
+        let channels: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
+        let alone = count.get(effect.meta.id) == Some(&1);
+        for (i, declaration) in effect.meta.parameters.iter().enumerate() {
+            parameters[effect.first_parameter + i].name = if alone {
+                format!("{}.{}", effect.meta.id, declaration.id)
+            } else {
+                format!(
+                    "{}@{}.{}",
+                    effect.meta.id,
+                    channels.join("+"),
+                    declaration.id
+                )
+            };
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! The names an effect may use at its channels.
+
+use super::Names;
+use super::program::FIRST_BANK;
+use super::table::{Ordered, ParameterTable};
+use super::tree::{Slot, Tree};
+use crate::model::signals;
+use loopsight_core::{Channel, PlantMeta, Role};
+
+pub(super) const PARAMETERS: u8 = FIRST_BANK;
+pub(super) const ROLES: u8 = FIRST_BANK + 1;
+pub(super) const SIGNALS: u8 = FIRST_BANK + 2;
+pub(super) const HERE: u8 = FIRST_BANK + 3;
+/// What an effect sees beside signals, in this order.
+pub(super) const HERE_NAMES: [&str; 3] = ["nominal", "side", "time"];
+
+/// The names at some channels of a plant.
+pub(super) struct AtChannels<'a> {
+    pub(super) plant: &'static PlantMeta,
+    pub(super) at: &'a [&'static Channel],
+    pub(super) parameters: &'a Ordered<ParameterTable>,
+}
+
+impl AtChannels<'_> {
+    fn signal(&self, id: &str) -> Option<usize> {
+        signals(self.plant).position(|s| s.id == id)
+    }
+
+    /// The role of this name; where the plant has no signal `speed` that is the flow.
+    fn role(&self, name: &str) -> Option<Role> {
+        let other = name == "speed" && self.signal(name).is_none();
+        let id = if other { Role::Flow.id() } else { name };
+        Role::ALL.into_iter().find(|r| r.id() == id)
+    }
+
+    /// A role wins over a signal of the same name, unless they are different things.
+    fn reading(&self, role: Role, name: &str) -> Result<Slot, String> {
+        let played: Vec<Option<&str>> = self.at.iter().map(|c| c.read(role)).collect();
+        let signal = self.signal(name);
+        let of_role = slot(ROLES, role as usize);
+        match signal {
+            Some(index) if played.iter().flatten().all(|p| *p == name) => Ok(slot(SIGNALS, index)),
+            Some(_) => Err(format!(
+                "`{name}` is a signal of the plant, and the {} at `{}` is another",
+                role.name(),
+                self.at.first().map_or("", |c| c.id)
+            )),
+            None => match self.at.iter().find(|c| c.read(role).is_none()) {
+                Some(channel) => {
+                    let offered: Vec<&str> = channel.reads.iter().map(|r| r.0.id()).collect();
+                    Err(format!(
+                        "the channel `{}` offers no {}, it offers {}",
+                        channel.id,
+                        role.name(),
+                        offered.join(", ")
+                    ))
+                }
+                None => Ok(of_role),
+            },
+        }
+    }
+}
+
+impl Names for AtChannels<'_> {
+    fn find(&self, name: &str) -> Option<Result<Tree, String>> {
+        if let Some(index) = self.parameters.position(name) {
+            return Some(Ok(Tree::Name(slot(PARAMETERS, index))));
+        }
+        if let Some(index) = HERE_NAMES.iter().position(|n| *n == name) {
+            return Some(Ok(Tree::Name(slot(HERE, index))));
+        }
+        if let Some(role) = self.role(name) {
+            return Some(self.reading(role, name).map(Tree::Name));
+        }
+        self.signal(name)
+            .map(|index| Ok(Tree::Name(slot(SIGNALS, index))))
+    }
+
+    fn known(&self) -> Vec<String> {
+        let everywhere = |r: &Role| self.at.iter().all(|c| c.read(*r).is_some());
+        let roles = Role::ALL.into_iter().filter(everywhere).map(Role::id);
+        let own = self.parameters.ids().map(str::to_owned);
+        let read = roles.chain(HERE_NAMES).map(str::to_owned);
+        let mut names: Vec<String> = own.chain(read).collect();
+        for signal in signals(self.plant) {
+            if !names.iter().any(|n| n == signal.id) {
+                names.push(signal.id.to_owned());
+            }
+        }
+        names
+    }
+}
+
+pub(super) fn slot(bank: u8, index: usize) -> Slot {
+    Slot {
+        bank,
+        index: index as u16,
+    }
+}

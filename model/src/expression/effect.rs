@@ -1,0 +1,292 @@
+//! `[effect.expression]`: an effect that the model file itself defines.
+
+use serde::{Deserialize, Serialize};
+
+use super::at_channels::{AtChannels, HERE_NAMES, PARAMETERS, ROLES, SIGNALS, slot};
+use super::described::EFFECT_PART;
+use super::keep::{self, Kept};
+use super::parse::parse;
+use super::placed;
+use super::program::Program;
+use super::table::{Ordered, ParameterTable, check_name, check_unit, check_used};
+use super::tree::Tree;
+use crate::Dual;
+use crate::attach::unit_at;
+use crate::config::{Mistake, Step};
+use crate::model::signals;
+use crate::registry::{AnyPhysics, EffectPart, ReadyEffect, Values, effects};
+use loopsight_core::{
+    Channel, EffectMeta, Parameter, Physics, PlaceKind, PlantMeta, Reading, Real, Role,
+};
+
+/// `[effect.expression]`, as written.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct EffectTable {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    summary: Option<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    at: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    on: Vec<String>,
+    force: String,
+    #[serde(default, skip_serializing_if = "Ordered::is_empty")]
+    parameters: Ordered<ParameterTable>,
+}
+
+/// An effect that a model file defines: its declaration and its law.
+struct Law {
+    meta: EffectMeta,
+    force: Program,
+    /// Signals it reads by their own name.
+    signals: Vec<usize>,
+}
+
+macro_rules! physics {
+    ($($scalar:ty),*) => {$(
+        impl Physics<$scalar> for Law {
+            fn contribution(
+                &self,
+                at: &Reading<'_, $scalar>,
+                _z: &[$scalar],
+                p: &[$scalar],
+            ) -> $scalar {
+                let here = [at.nominal, at.side, <$scalar>::of(at.time)];
+                self.force.value(&[p, &Role::ALL.map(|r| at.get(r)), at.signals, &here])
+            }
+            fn state_derivative(
+                &self,
+                _at: &Reading<'_, $scalar>,
+                _z: &[$scalar],
+                _p: &[$scalar],
+                _dz: &mut [$scalar],
+            ) {
+            }
+            fn initial_state(
+                &self,
+                _at: &Reading<'_, $scalar>,
+                _p: &[$scalar],
+                _z: &mut [$scalar],
+            ) {
+            }
+        }
+    )*};
+}
+physics!(f32, f64, Dual);
+
+impl EffectTable {
+    /// What this table comes to at some channels; made once for the same text.
+    fn law(
+        &self,
+        plant: &'static PlantMeta,
+        at: &[&'static Channel],
+    ) -> Result<&'static Law, Mistake> {
+        static LAWS: Kept<Law> = Kept::new();
+        let parameters: Vec<_> = self
+            .parameters
+            .iter()
+            .map(|(id, p)| (id, p.without_value()))
+            .collect();
+        let ids: Vec<&str> = at.iter().map(|c| c.id).collect();
+        let key = format!(
+            "{:p} {ids:?} {:?} {:?} {:?} {parameters:?}",
+            plant, self.name, self.summary, self.force
+        );
+        LAWS.get(key, || self.understand(plant, at))
+    }
+
+    fn understand(
+        &self,
+        plant: &'static PlantMeta,
+        at: &[&'static Channel],
+    ) -> Result<Law, Mistake> {
+        for (id, _) in self.parameters.iter() {
+            let signal = signals(plant).any(|s| s.id == id);
+            let role = Role::ALL.iter().any(|r| r.id() == id);
+            let taken = if HERE_NAMES.contains(&id) || role {
+                Some("what an effect can read")
+            } else {
+                signal.then_some("a signal of the plant")
+            };
+            check_name("parameters", id, taken)?;
+        }
+        let names = AtChannels {
+            plant,
+            at,
+            parameters: &self.parameters,
+        };
+        let force: [Step; 1] = ["force".into()];
+        let tree = parse(&self.force, &names).map_err(|e| placed(&force, e))?;
+        check_used(
+            "parameters",
+            self.parameters.ids(),
+            &[&tree],
+            |i| slot(PARAMETERS, usize::from(i)),
+            "is not in the expression",
+        )?;
+        let mut read = Vec::new();
+        let mut roles = Vec::new();
+        tree.for_each_name(&mut |slot| {
+            let index = usize::from(slot.index);
+            match slot.bank {
+                SIGNALS if !read.contains(&index) => read.push(index),
+                ROLES => roles.extend(Role::ALL.get(index).filter(|r| !roles.contains(*r))),
+                _ => {}
+            }
+        });
+        let parameters = self.declare(plant, at, &tree)?;
+        let meta = EffectMeta {
+            id: keep::text(self.name.as_deref().unwrap_or(EFFECT_PART.id)),
+            summary: keep::text(
+                self.summary
+                    .as_deref()
+                    .unwrap_or("an effect that the model file defines"),
+            ),
+            symptom: "what the expression says is missing from the model",
+            remedy: "command against what the expression says, where the drive allows it",
+            equation: keep::text(&format!("w = {}", self.force.trim())),
+            reference: "the model file",
+            example: EFFECT_PART.example,
+            places: &PlaceKind::ALL,
+            reads: roles.leak(),
+            parameters: parameters.leak(),
+            ..EffectMeta::PLAIN
+        };
+        Ok(Law {
+            meta,
+            force: Program::new([&tree]),
+            signals: read,
+        })
+    }
+
+    fn declare(
+        &self,
+        plant: &'static PlantMeta,
+        at: &[&'static Channel],
+        tree: &Tree,
+    ) -> Result<Vec<Parameter>, Mistake> {
+        let held = |i: u16| {
+            let parameter = self.parameters.0.get(usize::from(i));
+            parameter.is_none_or(|(_, p)| p.is_held())
+        };
+        let found = tree.dependence(&|s| s.bank == PARAMETERS && !held(s.index));
+        let declare = |(index, (id, table)): (usize, (&str, &ParameterTable))| {
+            let linear = found.linear.contains(&slot(PARAMETERS, index));
+            let parameter = table.declare(id, linear)?;
+            // `channel` and `flow` may stand in a unit, as in those of the library.
+            let unit = at.first().map_or_else(
+                || parameter.unit.to_owned(),
+                |c| unit_at(parameter.unit, c, plant).0,
+            );
+            let path = ["parameters".into(), id.into(), "unit".into()];
+            check_unit(&path, &unit, parameter.unit)?;
+            Ok(parameter)
+        };
+        self.parameters.iter().enumerate().map(declare).collect()
+    }
+
+    fn check(&self) -> Result<(), Mistake> {
+        if !self.at.is_empty() && !self.on.is_empty() {
+            let message = "the channels are given as `at` and as `on`, expected one of them";
+            return Err(Mistake::key(["on".into()], message));
+        }
+        if let Some(name) = &self.name {
+            let path: [Step; 1] = ["name".into()];
+            if !super::lexer::is_name(name) {
+                let message = format!("`{name}` is no name, expected letters, digits and `_`");
+                return Err(Mistake::value(path, message));
+            }
+            if effects().iter().any(|e| e.id == name) {
+                let message = format!("`{name}` is the name of an effect of the library");
+                return Err(Mistake::value(path, message));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The effect as a file has it.
+#[derive(Clone, Debug)]
+struct Part {
+    table: EffectTable,
+    values: Values,
+}
+
+impl Serialize for Part {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        self.table.serialize(to)
+    }
+}
+
+impl<'de> Deserialize<'de> for Part {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let table = EffectTable::deserialize(from)?;
+        let values = table.parameters.values();
+        Ok(Self { table, values })
+    }
+}
+
+/// What an effect as an expression is before its expression is read.
+const UNREAD: EffectMeta = EffectMeta {
+    id: EFFECT_PART.id,
+    summary: EFFECT_PART.summary,
+    places: &PlaceKind::ALL,
+    ..EffectMeta::PLAIN
+};
+
+/// The law of an effect whose expression is not read.
+struct Nothing;
+
+impl<S: Real> Physics<S> for Nothing {
+    fn contribution(&self, _at: &Reading<'_, S>, _z: &[S], _p: &[S]) -> S {
+        S::zero()
+    }
+    fn state_derivative(&self, _at: &Reading<'_, S>, _z: &[S], _p: &[S], _dz: &mut [S]) {}
+    fn initial_state(&self, _at: &Reading<'_, S>, _p: &[S], _z: &mut [S]) {}
+}
+
+#[typetag::serde(name = "expression")]
+impl EffectPart for Part {
+    fn meta(&self) -> &'static EffectMeta {
+        &UNREAD
+    }
+    fn at(&self) -> &[String] {
+        if self.table.at.is_empty() {
+            &self.table.on
+        } else {
+            &self.table.at
+        }
+    }
+    fn values(&self) -> &Values {
+        &self.values
+    }
+    fn physics(&self) -> &'static dyn AnyPhysics {
+        &Nothing
+    }
+    fn at_key(&self) -> &'static str {
+        if self.table.on.is_empty() { "at" } else { "on" }
+    }
+    fn ready(
+        &self,
+        plant: &'static PlantMeta,
+        at: &[&'static Channel],
+    ) -> Result<ReadyEffect, Mistake> {
+        self.table.check()?;
+        let law = self.table.law(plant, at)?;
+        // Values are no part of what is kept.
+        for (id, p) in self.table.parameters.iter() {
+            p.declare(id, true)?;
+        }
+        let given = self.table.parameters.iter().map(|(id, p)| p.given(id));
+        let (given, paths) = given.unzip();
+        Ok(ReadyEffect {
+            meta: &law.meta,
+            physics: law,
+            given,
+            paths,
+            signals: law.signals.clone(),
+        })
+    }
+}

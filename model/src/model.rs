@@ -1,0 +1,480 @@
+//! A model: a plant with effects, sensors and parameter values, composed from TOML.
+
+use std::path::Path;
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+pub use crate::affine::{Affine, Treatment};
+use crate::attach::{attach, make_names_unique};
+pub use crate::attach::{misfit, unit_at};
+use crate::config::{ConfigError, ReadError, Source, Step, nearest, read_text};
+use crate::registry::{AnyDynamics, AnyPhysics, EffectPart, HostReal, PlantPart};
+use crate::run::{ColumnMap, Hold, LogMap};
+use crate::sensor::Sensor;
+use loopsight_core::{Channel, Derived, EffectMeta, Parameter, Place, PlantMeta, Role, Signal};
+
+/// A model file, as written.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelFile {
+    /// Name of the robot, for titles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// The plant.
+    pub plant: Box<dyn PlantPart>,
+    /// Effects, in the order they are applied.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effect: Vec<Box<dyn EffectPart>>,
+    /// How a log maps on the plant's signals.
+    #[serde(default)]
+    pub log: LogMap,
+    /// How the model is integrated.
+    #[serde(default)]
+    pub simulation: SimulationOptions,
+    /// What a fit estimates.
+    #[serde(default)]
+    pub fit: FitOptions,
+}
+
+/// `[simulation]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulationOptions {
+    /// Longest integration step, s; by default the plant's own ([`Plant::MAX_STEP_S`](loopsight_core::Plant::MAX_STEP_S)).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_step_s: Option<f64>,
+}
+
+/// `[fit]`: parameters that a fit estimates or holds, where this differs from their declaration.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitOptions {
+    /// Estimated though declared as known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub free: Vec<String>,
+    /// Held though declared as estimated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixed: Vec<String>,
+}
+
+/// Why a model could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelError {
+    /// The file could not be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A mistake in the file.
+    #[error(transparent)]
+    Config(#[from] Box<ConfigError>),
+    /// No part is linked into the program.
+    #[error(
+        "no plant is known to this program: link the crate that declares it with `use … as _;`"
+    )]
+    EmptyRegistry,
+    /// Parts share an id.
+    #[error("parts with the same id are linked: {}", .0.join(", "))]
+    Duplicates(Vec<String>),
+}
+
+/// A parameter of a composed model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelParameter {
+    /// Name within the model: `K_A`, `coulomb_friction.level`.
+    pub name: String,
+    /// Its declaration.
+    pub declaration: &'static Parameter,
+    /// SI unit, that of the channel filled in.
+    pub unit: String,
+    /// Its value; `None` where neither file nor declaration give one: a fit has to find it.
+    pub value: Option<f64>,
+    /// A fit estimates it.
+    pub free: bool,
+    /// What 1 of the declaration's default, scale and starts is here, in `unit`: 1 for parameters
+    /// of a plant, for those of an effect see [`loopsight_core::Channel::size`].
+    pub size: f64,
+    /// Where it stands in the file.
+    pub path: Vec<Step>,
+}
+
+impl ModelParameter {
+    /// Size of a noticeable change, in `unit`.
+    pub fn scale(&self) -> f64 {
+        self.declaration.scale * self.size
+    }
+
+    /// Values from which a fit to a recording of `duration` s should start; empty where one start
+    /// will do.
+    pub fn starts(&self, duration: f64) -> Vec<f64> {
+        let unit = if self.declaration.starts_in_durations {
+            duration
+        } else {
+            self.size
+        };
+        self.declaration.starts.iter().map(|s| s * unit).collect()
+    }
+}
+
+/// An effect of a composed model, bound to its channels.
+#[derive(Clone)]
+pub struct Attached {
+    /// The declaration.
+    pub meta: &'static EffectMeta,
+    /// The channels, in the order of the file.
+    pub at: Vec<&'static Channel>,
+    /// First of its parameters in [`Model::parameters`].
+    pub first_parameter: usize,
+    pub(crate) physics: &'static dyn AnyPhysics,
+    /// For each channel and role, the index of the signal that plays it.
+    pub(crate) reads: Vec<[Option<usize>; Role::COUNT]>,
+    /// Signals it reads beside those.
+    pub(crate) signals: Vec<usize>,
+}
+
+/// A measured signal of a composed model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredSignal {
+    /// Index among states, inputs and outputs, in that order.
+    pub index: usize,
+    /// The declaration.
+    pub signal: &'static Signal,
+    /// How the number is made.
+    pub sensor: Sensor,
+}
+
+/// A plant with effects, sensors and parameter values, checked.
+#[derive(Clone)]
+pub struct Model {
+    /// Name of the robot.
+    pub name: String,
+    /// The plant's declaration.
+    pub plant: &'static PlantMeta,
+    /// Plant parameters first, then those of the effects.
+    pub parameters: Vec<ModelParameter>,
+    /// Effects in order.
+    pub effects: Vec<Attached>,
+    /// What is measured, in the order of the signals.
+    pub measured: Vec<MeasuredSignal>,
+    /// How a log maps on the signals.
+    pub log: LogMap,
+    /// Longest integration step, s.
+    pub max_step: f64,
+    pub(crate) dynamics: &'static dyn AnyDynamics,
+    pub(crate) set: usize,
+    pub(crate) n_plant_parameters: usize,
+}
+
+impl std::fmt::Debug for Model {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Model")
+            .field("name", &self.name)
+            .field("plant", &self.plant.id)
+            .field("parameters", &self.parameters)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Signals of a plant by index: states, then inputs, then outputs.
+pub fn signals(plant: &'static PlantMeta) -> impl Iterator<Item = &'static Signal> {
+    plant.states.iter().chain(plant.inputs).chain(plant.outputs)
+}
+
+pub(crate) fn signal_index(plant: &'static PlantMeta, id: &str) -> Option<usize> {
+    signals(plant).position(|s| s.id == id)
+}
+
+impl Model {
+    /// Reads a model file.
+    pub fn load(path: &Path) -> Result<(Self, Source), ModelError> {
+        let text = read_text(path)?;
+        Self::from_toml(&path.display().to_string(), &text)
+    }
+
+    /// Composes a model from TOML; `file` names it in messages.
+    pub fn from_toml(file: &str, text: &str) -> Result<(Self, Source), ModelError> {
+        crate::registry::check()?;
+        let source = Source::parse(file, text)?;
+        let parsed: ModelFile = source.read()?;
+        let model = Self::compose(&parsed, &source)?;
+        Ok((model, source))
+    }
+
+    /// Composes a model from a parsed file; `source` places the errors.
+    pub fn compose(file: &ModelFile, source: &Source) -> Result<Self, Box<ConfigError>> {
+        let prefix: [Step; 2] = ["plant".into(), file.plant.meta().id.into()];
+        let ready = file
+            .plant
+            .ready()
+            .map_err(|mistake| source.mistake(&prefix, mistake))?;
+        let (plant, values) = (ready.meta, ready.values);
+        let declared: &'static [Parameter] = match values.set {
+            0 => plant.parameters,
+            set => plant.parameterizations[set - 1].parameters,
+        };
+        let mut parameters: Vec<ModelParameter> = declared
+            .iter()
+            .zip(values.given.iter().zip(ready.paths))
+            .map(|(declaration, (given, path))| ModelParameter {
+                name: declaration.id.to_owned(),
+                declaration,
+                unit: declaration.unit.to_owned(),
+                value: given.or(declaration.default),
+                free: declaration.estimated,
+                size: 1.0,
+                path: prefix.iter().cloned().chain(path).collect(),
+            })
+            .collect();
+        let n_plant_parameters = parameters.len();
+
+        let mut effects = Vec::new();
+        for (index, part) in file.effect.iter().enumerate() {
+            let attached = attach(plant, part.as_ref(), index, &mut parameters, source)?;
+            effects.push(attached);
+        }
+        make_names_unique(&mut parameters, &effects);
+
+        let usual = <f64 as HostReal>::dynamics(ready.dynamics).max_step_s();
+        let step = file.simulation.max_step_s.unwrap_or(usual);
+        if !(step > 0.0 && step.is_finite()) {
+            return Err(source.error(
+                &["simulation".into(), "max_step_s".into()],
+                &format!("the longest integration step is {step} s, expected a number above 0 s"),
+                None,
+            ));
+        }
+        for (list, free) in [(&file.fit.free, true), (&file.fit.fixed, false)] {
+            for (i, name) in list.iter().enumerate() {
+                let Some(found) = parameters.iter_mut().find(|p| p.name == *name) else {
+                    let key = if free { "free" } else { "fixed" };
+                    let names: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
+                    return Err(source.error(
+                        &["fit".into(), key.into(), i.into()],
+                        &format!(
+                            "unknown parameter `{name}`, expected one of {}",
+                            names.join(", ")
+                        ),
+                        nearest(name, names).map(|n| format!("did you mean `{n}`?")),
+                    ));
+                };
+                found.free = free;
+            }
+        }
+        check_inputs(plant, &file.log, source)?;
+
+        let mut model = Self {
+            name: file.name.clone().unwrap_or_else(|| plant.id.to_owned()),
+            plant,
+            parameters,
+            effects,
+            measured: Vec::new(),
+            log: file.log.clone(),
+            max_step: step,
+            dynamics: ready.dynamics,
+            set: values.set,
+            n_plant_parameters,
+        };
+        let measured: Vec<(String, Sensor)> = file
+            .log
+            .measured
+            .iter()
+            .map(|(id, m)| (id.clone(), m.sensor.clone()))
+            .collect();
+        model.measure(&measured).map_err(|(id, message, help)| {
+            source.error(
+                &["log".into(), "measured".into(), id.as_str().into()],
+                &message,
+                help,
+            )
+        })?;
+        Ok(model)
+    }
+
+    /// Says what is measured: ids of signals with their sensors. An error is `(id, message, help)`.
+    pub fn measure(
+        &mut self,
+        list: &[(String, Sensor)],
+    ) -> Result<(), (String, String, Option<String>)> {
+        let mut measured = Vec::new();
+        for (id, sensor) in list {
+            let index = self.find_signal(id).map_err(|(m, h)| (id.clone(), m, h))?;
+            if let Sensor::EncoderCounts(encoder) = sensor {
+                let counts = encoder.counts_per_revolution;
+                if !(counts > 0.0 && counts.is_finite()) {
+                    return Err((
+                        id.clone(),
+                        format!("counts_per_revolution is {counts}, expected a number above 0"),
+                        None,
+                    ));
+                }
+                for (shaft, gain) in &encoder.of {
+                    self.find_signal(shaft)
+                        .map_err(|(m, h)| (id.clone(), m, h))?;
+                    if !gain.is_finite() {
+                        return Err((id.clone(), format!("the gain of `{shaft}` is {gain}"), None));
+                    }
+                }
+            }
+            let signal = signals(self.plant).nth(index);
+            if let Some(signal) = signal {
+                measured.push(MeasuredSignal {
+                    index,
+                    signal,
+                    sensor: sensor.clone(),
+                });
+            }
+        }
+        measured.sort_by_key(|m| m.index);
+        self.measured = measured;
+        Ok(())
+    }
+
+    /// Index of a signal by id; the error is `(message, help)`.
+    pub fn find_signal(&self, id: &str) -> Result<usize, (String, Option<String>)> {
+        signal_index(self.plant, id).ok_or_else(|| {
+            let ids: Vec<&str> = signals(self.plant).map(|s| s.id).collect();
+            (
+                format!(
+                    "the plant `{}` has no signal `{id}`, expected one of {}",
+                    self.plant.id,
+                    ids.join(", ")
+                ),
+                nearest(id, ids).map(|n| format!("did you mean `{n}`?")),
+            )
+        })
+    }
+
+    /// Index of the signal that is the integral of the signal `index`, if the plant has it.
+    pub fn integral_of(&self, index: usize) -> Option<usize> {
+        let id = signals(self.plant).nth(index)?.id;
+        let (_, integral) = self.plant.integrals.iter().find(|(rate, _)| *rate == id)?;
+        signal_index(self.plant, integral)
+    }
+
+    /// Values of all parameters, in order; NaN where none is known yet.
+    pub fn values(&self) -> Vec<f64> {
+        self.parameters
+            .iter()
+            .map(|p| p.value.unwrap_or(f64::NAN))
+            .collect()
+    }
+
+    /// Names of the parameters that have no value yet.
+    pub fn missing_values(&self) -> Vec<&str> {
+        self.parameters
+            .iter()
+            .filter(|p| p.value.is_none())
+            .map(|p| p.name.as_str())
+            .collect()
+    }
+
+    /// Sets all values, in order.
+    pub fn set_values(&mut self, values: &[f64]) {
+        for (parameter, value) in self.parameters.iter_mut().zip(values) {
+            parameter.value = value.is_finite().then_some(*value);
+        }
+    }
+
+    /// How the `index`-th input runs between the samples of a log.
+    pub fn hold(&self, index: usize) -> Hold {
+        let input = self.plant.inputs.get(index);
+        input
+            .and_then(|i| self.log.inputs.get(i.id))
+            .map_or(Hold::ZeroOrder, ColumnMap::hold)
+    }
+
+    /// Number of plant states.
+    pub fn n_states(&self) -> usize {
+        self.plant.states.len()
+    }
+
+    /// Number of signals: states, inputs, outputs.
+    pub fn n_signals(&self) -> usize {
+        self.plant.states.len() + self.plant.inputs.len() + self.plant.outputs.len()
+    }
+
+    /// Number of effort channels.
+    pub fn n_efforts(&self) -> usize {
+        self.plant
+            .channels
+            .iter()
+            .filter(|c| matches!(c.place, Place::Effort(_)))
+            .count()
+    }
+
+    /// Longest integration step of the plant where no file gives one, s.
+    pub fn usual_step(&self) -> f64 {
+        f64::dynamics(self.dynamics).max_step_s()
+    }
+
+    /// Longest integration step that is taken, s: [`Model::max_step`], or what an effect asks for with
+    /// [`EffectMeta::max_step_s`](loopsight_core::EffectMeta::max_step_s).
+    pub fn step(&self) -> f64 {
+        let effects = self.effects.iter().map(|e| e.meta.max_step_s);
+        effects.fold(self.max_step, f64::min)
+    }
+
+    /// Parameters of the plant's equations from the model's values.
+    pub fn lower<S: HostReal>(&self, values: &[S]) -> Vec<S> {
+        let mut p = vec![S::zero(); self.plant.parameters.len()];
+        S::dynamics(self.dynamics).lower(self.set, &values[..self.n_plant_parameters], &mut p);
+        p
+    }
+
+    /// What follows from the plant's parameters at the model's values.
+    pub fn derived<S: HostReal>(&self, values: &[S]) -> Vec<(&'static Derived, S)> {
+        let p = self.lower(values);
+        let dynamics = S::dynamics(self.dynamics);
+        let of = |(index, meta)| (meta, dynamics.derived(index, &p));
+        dynamics.derivable().iter().enumerate().map(of).collect()
+    }
+
+    /// All signals (states, inputs, outputs) at a state and input, without effects.
+    pub fn signals_at<S: HostReal>(&self, p: &[S], x: &[S], u: &[S], y: &mut [S]) {
+        let (nx, nu) = (x.len(), u.len());
+        y[..nx].copy_from_slice(x);
+        y[nx..nx + nu].copy_from_slice(u);
+        let dynamics = S::dynamics(self.dynamics);
+        for (index, output) in y[nx + nu..].iter_mut().enumerate() {
+            *output = dynamics.output(index, x, u, p);
+        }
+    }
+}
+
+/// Moore–Penrose inverse, singular values below 1e-9 of the largest left out; `None` when it
+/// cannot be computed (not finite).
+pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    if matrix.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    // The decomposition below refuses a matrix without rows or columns; its inverse has none either.
+    if matrix.is_empty() {
+        return Some(matrix.transpose());
+    }
+    let largest = matrix.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+    matrix
+        .clone()
+        .pseudo_inverse(1e-9 * largest.max(f64::MIN_POSITIVE))
+        .ok()
+}
+
+fn check_inputs(
+    plant: &'static PlantMeta,
+    log: &LogMap,
+    source: &Source,
+) -> Result<(), Box<ConfigError>> {
+    for id in log.inputs.keys() {
+        if !plant.inputs.iter().any(|s| s.id == id) {
+            let ids: Vec<&str> = plant.inputs.iter().map(|s| s.id).collect();
+            return Err(source.error(
+                &["log".into(), "inputs".into(), id.as_str().into()],
+                &format!(
+                    "the plant `{}` has no input `{id}`, expected one of {}",
+                    plant.id,
+                    ids.join(", ")
+                ),
+                nearest(id, ids).map(|n| format!("did you mean `{n}`?")),
+            ));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,187 @@
+//! Effects at their channels, ready to be evaluated.
+
+use crate::model::{Attached, Model};
+use crate::registry::HostReal;
+use loopsight_core::{Channel, Past, Place, Reading, Role};
+
+/// An effect at one channel.
+#[derive(Clone, Debug)]
+pub(crate) struct Bound {
+    /// Index of the effect in the model.
+    pub(crate) effect: usize,
+    pub(crate) place: Place,
+    side: f64,
+    is_position: bool,
+    reads: [Option<usize>; Role::COUNT],
+    /// Signals it reads beside those.
+    signals: Vec<usize>,
+    /// First of its states in the extended state vector.
+    pub(crate) z: usize,
+    /// Number of its states.
+    pub(crate) n_z: usize,
+    /// Index into the histories, for effects with memory.
+    pub(crate) history: Option<usize>,
+}
+
+/// All effects of a model by the kind of place they act at, in the model's order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Bounds {
+    /// With memory, on inputs.
+    pub(crate) input_memory: Vec<Bound>,
+    pub(crate) inputs: Vec<Bound>,
+    pub(crate) efforts: Vec<Bound>,
+    pub(crate) bodies: Vec<Bound>,
+    pub(crate) outputs: Vec<Bound>,
+    /// With memory, on outputs.
+    pub(crate) output_memory: Vec<Bound>,
+    /// Number of histories.
+    pub(crate) histories: usize,
+    /// Number of effect states.
+    pub(crate) states: usize,
+}
+
+impl Bounds {
+    /// Binds the effects of `model`; their states follow the plant's.
+    pub(crate) fn of(model: &Model) -> Self {
+        let mut bounds = Self::default();
+        let first = model.n_states();
+        for (index, effect) in model.effects.iter().enumerate() {
+            for (channel, reads) in effect.at.iter().zip(&effect.reads) {
+                let history = effect.meta.memory.then_some(bounds.histories);
+                bounds.histories += usize::from(effect.meta.memory);
+                let bound = Bound {
+                    effect: index,
+                    place: channel.place,
+                    side: f64::from(channel.side),
+                    is_position: matches!(channel.place, Place::Output(i)
+                        if reads_position(model, channel) == Some(i)),
+                    reads: *reads,
+                    signals: effect.signals.clone(),
+                    z: first + bounds.states,
+                    n_z: effect.meta.states,
+                    history,
+                };
+                bounds.states += effect.meta.states;
+                match (channel.place, effect.meta.memory) {
+                    (Place::Input(_), true) => bounds.input_memory.push(bound),
+                    (Place::Input(_), false) => bounds.inputs.push(bound),
+                    (Place::Output(_), true) => bounds.output_memory.push(bound),
+                    (Place::Output(_), false) => bounds.outputs.push(bound),
+                    (Place::Effort(_), _) => bounds.efforts.push(bound),
+                    (Place::Rate(_), _) => bounds.bodies.push(bound),
+                }
+            }
+        }
+        bounds
+    }
+
+    /// All of them.
+    pub(crate) fn all(&self) -> impl Iterator<Item = &Bound> {
+        self.input_memory
+            .iter()
+            .chain(&self.inputs)
+            .chain(&self.efforts)
+            .chain(&self.bodies)
+            .chain(&self.outputs)
+            .chain(&self.output_memory)
+    }
+
+    /// Whether nothing acts within an integration step.
+    pub(crate) fn idle(&self) -> bool {
+        self.inputs.is_empty()
+            && self.efforts.is_empty()
+            && self.bodies.is_empty()
+            && self.outputs.iter().all(|b| b.n_z == 0)
+    }
+
+    /// Signals that effects acting within a step read.
+    pub(crate) fn read(&self) -> impl Iterator<Item = usize> + '_ {
+        self.inputs
+            .iter()
+            .chain(&self.efforts)
+            .chain(&self.bodies)
+            .chain(&self.outputs)
+            .flat_map(|b| {
+                let own = match b.place {
+                    Place::Output(i) => Some(i),
+                    _ => None,
+                };
+                let named = b.reads.iter().flatten().chain(&b.signals);
+                named.copied().chain(own)
+            })
+    }
+}
+
+fn reads_position(model: &Model, channel: &Channel) -> Option<usize> {
+    let id = channel.read(Role::Position)?;
+    model.find_signal(id).ok()
+}
+
+/// What an effect is evaluated with.
+pub(crate) struct Scene<'a, S> {
+    pub(crate) model: &'a Model,
+    /// Parameter values of the whole model.
+    pub(crate) values: &'a [S],
+    /// Extended state.
+    pub(crate) x: &'a [S],
+    pub(crate) signals: &'a [S],
+    pub(crate) time: f64,
+    /// Interval over which a contribution with memory holds.
+    pub(crate) interval: (f64, f64),
+}
+
+impl<S: HostReal> Scene<'_, S> {
+    fn effect(&self, bound: &Bound) -> &Attached {
+        &self.model.effects[bound.effect]
+    }
+
+    fn reading<'p>(&'p self, bound: &Bound, nominal: S, past: &'p dyn Past<S>) -> Reading<'p, S> {
+        Reading {
+            time: self.time,
+            from: self.interval.0,
+            to: self.interval.1,
+            nominal,
+            side: S::of(bound.side),
+            is_position: bound.is_position,
+            roles: bound.reads.map(|read| self.signals.get(read?)),
+            signals: self.signals,
+            past,
+        }
+    }
+
+    fn parameters(&self, bound: &Bound) -> &[S] {
+        let effect = self.effect(bound);
+        let first = effect.first_parameter;
+        &self.values[first..first + effect.meta.parameters.len()]
+    }
+
+    /// What the effect adds to its channel.
+    pub(crate) fn contribution(&self, bound: &Bound, nominal: S, past: &dyn Past<S>) -> S {
+        S::physics(self.effect(bound).physics).contribution(
+            &self.reading(bound, nominal, past),
+            &self.x[bound.z..bound.z + bound.n_z],
+            self.parameters(bound),
+        )
+    }
+
+    /// The rates of its states.
+    pub(crate) fn rates(&self, bound: &Bound, nominal: S, past: &dyn Past<S>, dx: &mut [S]) {
+        if bound.n_z > 0 {
+            S::physics(self.effect(bound).physics).state_derivative(
+                &self.reading(bound, nominal, past),
+                &self.x[bound.z..bound.z + bound.n_z],
+                self.parameters(bound),
+                &mut dx[bound.z..bound.z + bound.n_z],
+            );
+        }
+    }
+
+    /// Its states at the start of a run, into `z`.
+    pub(crate) fn initial(&self, bound: &Bound, nominal: S, past: &dyn Past<S>, z: &mut [S]) {
+        S::physics(self.effect(bound).physics).initial_state(
+            &self.reading(bound, nominal, past),
+            self.parameters(bound),
+            z,
+        );
+    }
+}

@@ -1,0 +1,461 @@
+//! A composed model in motion: the free run that everything is judged by.
+
+pub(crate) mod bound;
+mod follow;
+pub(crate) mod history;
+mod observer;
+mod push;
+mod ramp;
+mod sensing;
+mod start;
+mod values;
+
+use std::borrow::Cow;
+
+use crate::model::Model;
+use crate::registry::HostReal;
+use crate::run::Hold;
+use loopsight_core::{NoPast, Place, Rk4, substeps};
+
+use bound::{Bounds, Scene};
+pub use follow::{follow, free_run};
+use history::{Between, History};
+pub use observer::StateObserver;
+use push::Pushed;
+use ramp::{hold_means, ramped};
+use sensing::{Integral, Sensing, sense};
+
+/// Integrates a model through time.
+///
+/// The extended state is the plant's, then the effects' states, then running integrals of those
+/// measured signals whose mean or past is needed and whose integral the plant does not know.
+///
+/// Order of evaluation at each stage: effects on inputs, the plant's outputs, efforts, the plant,
+/// effects on the rates of its states. Effects with memory on inputs come first, once per
+/// integration step; effects on sensors act on what is measured.
+#[derive(Clone)]
+pub struct Simulator<'m, S> {
+    model: Cow<'m, Model>,
+    p: Vec<S>,
+    values: Vec<S>,
+    bounds: Bounds,
+    sensors: Vec<Sensing>,
+    histories: Vec<History<S>>,
+    rk4: Rk4<Vec<S>>,
+    x: Vec<S>,
+    scratch: Scratch<S>,
+    pushed: Pushed<S>,
+    /// Integrals behind means at the start of the last interval, one per sensor.
+    before: Vec<S>,
+    /// What output effects added to angles then, one per output effect.
+    added_before: Vec<S>,
+    /// Outputs that are needed at every stage, by index among the outputs.
+    needed: Vec<usize>,
+    time: f64,
+    interval: f64,
+    /// Longest integration step, s.
+    longest: f64,
+    /// How fast each input changes within the interval that is integrated, per second.
+    slopes: Vec<f64>,
+    /// Inputs that run on straight lines between samples.
+    ramped: Vec<usize>,
+}
+
+#[derive(Clone)]
+struct Scratch<S> {
+    /// Inputs after the effects with memory.
+    held: Vec<S>,
+    /// Inputs after all effects.
+    u: Vec<S>,
+    w: Vec<S>,
+    signals: Vec<S>,
+}
+
+impl<S: HostReal> Simulator<'static, S> {
+    /// As [`Simulator::new`], keeping the model: for a driver, which outlives who builds it.
+    pub fn owning(model: Model, values: &[S]) -> Self {
+        Self::compose(Cow::Owned(model), values)
+    }
+}
+
+impl<'m, S: HostReal> Simulator<'m, S> {
+    /// A simulator of `model` with the parameter `values` (as long as `model.parameters`), at rest.
+    pub fn new(model: &'m Model, values: &[S]) -> Self {
+        Self::compose(Cow::Borrowed(model), values)
+    }
+
+    fn compose(model: Cow<'m, Model>, values: &[S]) -> Self {
+        let nx = model.n_states();
+        let nu = model.plant.inputs.len();
+        let bounds = Bounds::of(&model);
+        let mut size = nx + bounds.states;
+        let sensors: Vec<Sensing> = model
+            .measured
+            .iter()
+            .map(|m| {
+                let sensing = sense(&model, &bounds, m.index, &m.sensor, size);
+                size += usize::from(matches!(sensing.integral, Integral::State(_)));
+                sensing
+            })
+            .collect();
+        let integrated = sensors
+            .iter()
+            .filter(|s| matches!(s.integral, Integral::State(_)))
+            .map(|s| s.index);
+        let mut needed: Vec<usize> = bounds
+            .read()
+            .chain(integrated)
+            .filter_map(|i| i.checked_sub(nx + nu))
+            .collect();
+        needed.sort_unstable();
+        needed.dedup();
+        // Not cloned from one: a clone of an empty history has no room kept for what is to come.
+        let histories = (0..bounds.histories)
+            .map(|i| {
+                let smooth = bounds.output_memory.iter().any(|b| b.history == Some(i));
+                History::new(if smooth {
+                    Between::Smooth
+                } else {
+                    Between::Held
+                })
+            })
+            .collect();
+        let mut simulator = Self {
+            p: model.lower(values),
+            values: values.to_vec(),
+            histories,
+            rk4: Rk4::new(vec![S::zero(); size]),
+            x: vec![S::zero(); size],
+            scratch: Scratch {
+                held: vec![S::zero(); nu],
+                u: vec![S::zero(); nu],
+                w: vec![S::zero(); model.n_efforts()],
+                signals: vec![S::zero(); model.n_signals()],
+            },
+            pushed: Pushed::nothing(&model),
+            before: vec![S::zero(); sensors.len()],
+            added_before: vec![S::zero(); bounds.outputs.len()],
+            needed,
+            sensors,
+            bounds,
+            time: 0.0,
+            interval: 0.0,
+            longest: model.step(),
+            slopes: vec![0.0; nu],
+            ramped: (0..nu)
+                .filter(|i| model.hold(*i) == Hold::FirstOrder)
+                .collect(),
+            model,
+        };
+        simulator.reset(&vec![S::zero(); nx], &vec![0.0; nu]);
+        simulator
+    }
+
+    /// Time since the start of the run, s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// The plant state.
+    pub fn state(&self) -> &[S] {
+        &self.x[..self.model.n_states()]
+    }
+
+    /// The plant state, to be corrected.
+    pub fn state_mut(&mut self) -> &mut [S] {
+        let nx = self.model.n_states();
+        &mut self.x[..nx]
+    }
+
+    /// All signals of the plant (states, inputs, outputs) now.
+    pub fn signals(&mut self) -> &[S] {
+        self.refresh();
+        &self.scratch.signals
+    }
+
+    fn refresh(&mut self) {
+        let nx = self.model.n_states();
+        let Scratch { held, signals, .. } = &mut self.scratch;
+        self.model.signals_at(&self.p, &self.x[..nx], held, signals);
+    }
+
+    fn scene(&self) -> Scene<'_, S> {
+        Scene {
+            model: &self.model,
+            values: &self.values,
+            x: &self.x,
+            signals: &self.scratch.signals,
+            time: self.time,
+            interval: (self.time - self.interval, self.time),
+        }
+    }
+
+    /// The integral behind the mean of a sensor; signals must be fresh.
+    fn integral(&self, sensor: &Sensing) -> S {
+        match sensor.integral {
+            Integral::None => S::zero(),
+            Integral::Signal(i) => self.scratch.signals[i],
+            Integral::State(i) => self.x[i],
+        }
+    }
+
+    /// Keeps the integrals with which the next interval begins; signals must be fresh.
+    fn mark(&mut self) {
+        for i in 0..self.sensors.len() {
+            self.before[i] = self.integral(&self.sensors[i]);
+        }
+        if self.sensors.iter().any(|s| !s.through.is_empty()) {
+            for i in 0..self.bounds.outputs.len() {
+                self.added_before[i] = self.added(i);
+            }
+        }
+    }
+
+    /// What the `i`-th output effect adds to its signal now.
+    fn added(&self, i: usize) -> S {
+        let bound = &self.bounds.outputs[i];
+        let Place::Output(index) = bound.place else {
+            return S::zero();
+        };
+        self.scene()
+            .contribution(bound, self.scratch.signals[index], &NoPast)
+    }
+
+    /// Writes the present into the past of sensors with memory; signals must be fresh.
+    fn remember(&mut self) {
+        for k in 0..self.bounds.output_memory.len() {
+            let bound = &self.bounds.output_memory[k];
+            let (Some(history), Place::Output(index)) = (bound.history, bound.place) else {
+                continue;
+            };
+            let Some(sensor) = self.sensors.iter().find(|s| s.index == index) else {
+                continue;
+            };
+            let value = self.scratch.signals[index] + self.output_effects(index);
+            let integral = self.integral(sensor);
+            self.histories[history].pass(self.time, value, integral);
+        }
+    }
+
+    /// The sum of what the effects without memory add to an output now.
+    fn output_effects(&self, index: usize) -> S {
+        let scene = self.scene();
+        let mut value = self.scratch.signals[index];
+        for bound in self
+            .bounds
+            .outputs
+            .iter()
+            .filter(|b| b.place == Place::Output(index))
+        {
+            value += scene.contribution(bound, value, &NoPast);
+        }
+        value - self.scratch.signals[index]
+    }
+
+    /// Integrates to `until` (s since the start of the run) with `input` applied from now on.
+    pub fn advance(&mut self, until: f64, input: &[f64]) {
+        if !self.sensors.is_empty() {
+            self.refresh();
+            self.mark();
+        }
+        for bound in &self.bounds.input_memory {
+            if let (Some(history), Place::Input(i)) = (bound.history, bound.place)
+                && self.slopes[i] == 0.0
+            {
+                self.histories[history].hold(self.time, S::of(input[i]));
+            }
+        }
+        let span = until - self.time;
+        let start = self.time;
+        let steps = substeps(span, self.longest);
+        let h = span / steps as f64;
+        for step in 0..steps {
+            let elapsed = h * step as f64;
+            self.apply(input, elapsed);
+            self.step(start + elapsed, h);
+            if !self.bounds.output_memory.is_empty() {
+                self.time = start + h * (step + 1) as f64;
+                self.refresh();
+                self.remember();
+            }
+        }
+        self.time = until;
+        self.interval = span;
+    }
+
+    /// One integration step, from the inputs in `held`; leaves those at its end there.
+    fn step(&mut self, from: f64, h: f64) {
+        let Self {
+            model,
+            p,
+            values,
+            bounds,
+            sensors,
+            histories,
+            rk4,
+            x,
+            scratch,
+            pushed,
+            needed,
+            slopes,
+            ..
+        } = self;
+        let model: &Model = model;
+        let ramping = slopes.iter().any(|s| *s != 0.0);
+        if ramping {
+            hold_means(bounds, histories, &mut scratch.held, slopes, from, h);
+        }
+        for bound in &bounds.input_memory {
+            let (Some(history), Place::Input(i)) = (bound.history, bound.place) else {
+                continue;
+            };
+            let interval = (from, from + h);
+            let scene = Scene {
+                model,
+                values,
+                x,
+                signals: &scratch.signals,
+                time: from,
+                interval,
+            };
+            let nominal = scratch.held[i];
+            scratch.held[i] += scene.contribution(bound, nominal, &histories[history]);
+        }
+        for (held, push) in scratch.held.iter_mut().zip(&pushed.inputs) {
+            *held += *push;
+        }
+        scratch.w.copy_from_slice(&pushed.efforts);
+        let (nx, nu) = (model.n_states(), model.plant.inputs.len());
+        let dynamics = S::dynamics(model.dynamics);
+        if bounds.idle() && x.len() == nx && pushed.rates.is_empty() && !ramping {
+            // Nothing changes what acts on the plant within the step: half the time.
+            dynamics.step(x, S::of(h), &scratch.held, &scratch.w, p);
+            return;
+        }
+        let Scratch {
+            held,
+            u,
+            w,
+            signals,
+        } = scratch;
+        rk4.step(x, S::of(h), |stage, x, dx| {
+            let time = from + h * [0.0, 0.5, 0.5, 1.0][stage];
+            let interval = (time, time);
+            let plant_x = &x[..nx];
+            u.copy_from_slice(held);
+            if ramping {
+                ramped(u, bounds, slopes, time - from);
+            }
+            signals[..nx].copy_from_slice(plant_x);
+            let refresh = |u: &[S], signals: &mut [S]| {
+                signals[nx..nx + nu].copy_from_slice(u);
+                for index in needed.iter() {
+                    signals[nx + nu + index] = dynamics.output(*index, plant_x, u, p);
+                }
+            };
+            refresh(u, signals);
+            if !bounds.inputs.is_empty() {
+                let scene = Scene {
+                    model,
+                    values,
+                    x,
+                    signals,
+                    time,
+                    interval,
+                };
+                for bound in &bounds.inputs {
+                    let Place::Input(i) = bound.place else {
+                        continue;
+                    };
+                    scene.rates(bound, u[i], &NoPast, dx);
+                    let add = scene.contribution(bound, u[i], &NoPast);
+                    u[i] += add;
+                }
+                refresh(u, signals);
+            }
+            let scene = Scene {
+                model,
+                values,
+                x,
+                signals,
+                time,
+                interval,
+            };
+            if !bounds.efforts.is_empty() {
+                w.copy_from_slice(&pushed.efforts);
+                for bound in &bounds.efforts {
+                    let Place::Effort(i) = bound.place else {
+                        continue;
+                    };
+                    scene.rates(bound, w[i], &NoPast, dx);
+                    let add = scene.contribution(bound, w[i], &NoPast);
+                    w[i] += add;
+                }
+            }
+            dynamics.derivative(plant_x, u, w, p, &mut dx[..nx]);
+            for (rate, push) in dx.iter_mut().zip(&pushed.rates) {
+                *rate += *push;
+            }
+            for bound in &bounds.bodies {
+                let Place::Rate(i) = bound.place else {
+                    continue;
+                };
+                let nominal = dx[i];
+                scene.rates(bound, nominal, &NoPast, dx);
+                dx[i] += scene.contribution(bound, nominal, &NoPast);
+            }
+            for bound in bounds.outputs.iter().filter(|b| b.n_z > 0) {
+                let Place::Output(i) = bound.place else {
+                    continue;
+                };
+                scene.rates(bound, signals[i], &NoPast, dx);
+            }
+            for sensor in sensors.iter() {
+                let Integral::State(to) = sensor.integral else {
+                    continue;
+                };
+                let mut value = signals[sensor.index];
+                for bound in &bounds.outputs {
+                    if bound.place == Place::Output(sensor.index) {
+                        value += scene.contribution(bound, value, &NoPast);
+                    }
+                }
+                dx[to] = value;
+            }
+        });
+        if ramping {
+            ramped(held, bounds, slopes, h);
+        }
+    }
+
+    /// What the sensors read now. A mean is taken over the last [`Simulator::advance`]; at the
+    /// start of a run it is the value itself.
+    pub fn measure(&mut self, measured: &mut [S]) {
+        self.refresh();
+        for (i, (to, sensor)) in measured.iter_mut().zip(&self.sensors).enumerate() {
+            let mean = sensor.is_mean && self.interval > 0.0;
+            *to = if mean {
+                (self.integral(sensor) - self.before[i]) / S::of(self.interval)
+            } else {
+                self.scratch.signals[sensor.index] + self.output_effects(sensor.index)
+            };
+            if mean {
+                for (effect, gain) in &sensor.through {
+                    let change = self.added(*effect) - self.added_before[*effect];
+                    *to += change * S::of(gain / self.interval);
+                }
+            }
+            let mut scene = self.scene();
+            if !mean {
+                scene.interval = (self.time, self.time);
+            }
+            for bound in &self.bounds.output_memory {
+                if let (Some(history), true) =
+                    (bound.history, bound.place == Place::Output(sensor.index))
+                {
+                    *to += scene.contribution(bound, *to, &self.histories[history]);
+                }
+            }
+        }
+    }
+}
