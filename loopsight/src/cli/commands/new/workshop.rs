@@ -13,27 +13,24 @@ use crate::cli::output;
 const FILES: [(&str, &str); 6] = [
     (
         "src/ship_heading.rs",
-        include_str!("../../../../../examples/custom-plant/src/ship_heading.rs"),
+        include_str!("../../../../template/ship_heading.rs"),
     ),
     (
         "src/norrbin_damping.rs",
-        include_str!("../../../../../examples/custom-plant/src/norrbin_damping.rs"),
+        include_str!("../../../../template/norrbin_damping.rs"),
     ),
     (
         "model.toml",
-        include_str!("../../../../../examples/custom-plant/model.toml"),
+        include_str!("../../../../template/model.toml"),
     ),
-    (
-        "ship.toml",
-        include_str!("../../../../../examples/custom-plant/ship.toml"),
-    ),
+    ("ship.toml", include_str!("../../../../template/ship.toml")),
     (
         "zigzag.toml",
-        include_str!("../../../../../examples/custom-plant/zigzag.toml"),
+        include_str!("../../../../template/zigzag.toml"),
     ),
     (
         "turns.toml",
-        include_str!("../../../../../examples/custom-plant/turns.toml"),
+        include_str!("../../../../template/turns.toml"),
     ),
 ];
 

@@ -1,0 +1,1 @@
+../../examples/custom-plant/src/norrbin_damping.rs

@@ -1,0 +1,1 @@
+../../examples/custom-plant/src/ship_heading.rs

@@ -1,0 +1,7 @@
+//! The command `loopsight`, as the tests of this crate run it.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    loopsight::cli::run()
+}
