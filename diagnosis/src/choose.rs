@@ -1,8 +1,7 @@
 //! Which explanation comes first.
 
+use crate::conclude::{CLOSE, SAME};
 use crate::conclusion::{Explanation, Place};
-use crate::diagnose::{CLOSE, SAME};
-use crate::fit::Fit;
 use crate::judge::{advantage, nrmse};
 use crate::trial::Judged;
 
@@ -24,19 +23,19 @@ pub(crate) struct Chosen {
 /// only where none has.
 pub(crate) fn choose(
     explanations: &mut Vec<Explanation>,
-    finalists: &[(Judged, Fit)],
+    finalists: &[Judged],
     floor: f64,
     earned: &dyn Fn(usize, &Explanation) -> bool,
 ) -> Option<Chosen> {
     finalists.first()?;
-    let squared = |i: usize| nrmse(&finalists[i].0.rank).powi(2);
+    let squared = |i: usize| nrmse(&finalists[i].rank).powi(2);
     let least = squared(0);
     // While the best explanation itself leaves much unexplained, small differences between
     // explanations are those of what else is missing.
     let allowed = least + BLUR * (least - floor * floor).max(0.0);
     // No worse than another, by statistics or for all that can be done with it.
     let same = |i: usize, other: usize| {
-        let (rank, other) = (&finalists[i].0.rank, &finalists[other].0.rank);
+        let (rank, other) = (&finalists[i].rank, &finalists[other].rank);
         let (error, least) = (nrmse(rank), nrmse(other));
         error < CLOSE * least || error < FAR * least && advantage(rank, other) < SAME
     };
@@ -48,8 +47,8 @@ pub(crate) fn choose(
         .collect();
     let none_earned = !not_worse.iter().any(|i| earned[*i]);
     let may = |i: &usize| earned[*i] || none_earned;
-    let complexity = |i: usize| finalists[i].0.candidate.complexity();
-    let error = |i: usize| nrmse(&finalists[i].0.rank);
+    let complexity = |i: usize| finalists[i].candidate.complexity();
+    let error = |i: usize| nrmse(&finalists[i].rank);
     let firsts = || not_worse.iter().copied().filter(may);
     let simplest = firsts().map(complexity).min()?;
     let leader = firsts()
@@ -63,13 +62,13 @@ pub(crate) fn choose(
         .filter(|i| complexity(*i) == simplest && same(*i, leader))
         .min_by(|a, b| {
             let channels = |i: usize| usize::MAX - explanations[i].place.at.len();
-            let rarity = |i: usize| finalists[i].0.candidate.meta.rarity;
+            let rarity = |i: usize| finalists[i].candidate.meta.rarity;
             let key = |i: usize| (rarity(i), channels(i));
             key(*a).cmp(&key(*b)).then(error(*a).total_cmp(&error(*b)))
         })?;
     // And another effect that does as well as the chosen one on what no fit saw.
-    let unseen = |i: usize| nrmse(&finalists[i].0.losses);
-    let id = |i: usize| finalists[i].0.candidate.meta.id;
+    let unseen = |i: usize| nrmse(&finalists[i].losses);
+    let id = |i: usize| finalists[i].candidate.meta.id;
     let as_well = |i: usize| {
         let near = unseen(i) <= unseen(chosen) && error(i) < FAR * error(chosen);
         near && id(i) != id(chosen)

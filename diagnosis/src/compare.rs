@@ -2,14 +2,17 @@
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
-use loopsight_model::simulate::{Simulator, free_run};
+use loopsight_model::simulate::{Simulator, try_follow};
 use loopsight_recordings::Fault;
 use nalgebra::DVector;
 use serde::Serialize;
 
+use crate::error::CompareError;
+use crate::measurements::Measurements;
 use crate::observer::{Held, hold};
 use crate::prediction::{InitialStates, one_step};
 use crate::problem::Solution;
+use crate::progress::{Stage, Work};
 use crate::score::{SignalScore, Tally, overall};
 use crate::where_it_fails::{Statement, where_it_fails};
 
@@ -37,11 +40,11 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// A comparison with nothing, to be filled in.
-    pub(crate) fn empty() -> Self {
+    /// A comparison of which only the error is known: what is left of one that was not made.
+    pub(crate) fn of_error(nrmse: f64) -> Self {
         Self {
-            nrmse: f64::NAN,
-            fit_percent: f64::NAN,
+            nrmse,
+            fit_percent: 100.0 * (1.0 - nrmse),
             signals: Vec::new(),
             faults: Vec::new(),
             observer: None,
@@ -81,46 +84,22 @@ pub struct SignalTrace {
     pub one_step: Vec<f64>,
 }
 
-/// Why a model cannot be held against a recording.
-#[derive(Debug, thiserror::Error, PartialEq)]
-pub enum CompareError {
-    /// Parameters have no value.
-    #[error("the model gives no value for {}: fit it first, or write the values into the file", .0.join(", "))]
-    MissingValues(Vec<String>),
-    /// Nothing is measured.
-    #[error("the model's log has no measured signal")]
-    NothingMeasured,
-    /// There is no sample.
-    #[error("the recording has no sample")]
-    NoSamples,
-    /// The simulation left the finite numbers.
-    #[error(
-        "the free run{} diverges after {time:.3} s: the model is unstable with these parameters",
-        of_run(run)
-    )]
-    Diverged {
-        /// The run.
-        run: String,
-        /// When, s.
-        time: f64,
-    },
-}
-
-/// ` of <run>` where the run has a name.
-fn of_run(name: &str) -> String {
-    if name.is_empty() {
-        String::new()
-    } else {
-        format!(" of `{name}`")
-    }
-}
-
 /// Simulates `model` over `runs` from the inputs alone, from initial states that are estimated for
 /// each run, and predicts each sample from the one before.
 ///
 /// A model that is unstable or integrates cannot be simulated like that: it is held to the
 /// measurements by an observer, as slow as it may be, and [`Comparison::observer`] says so.
-pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparison, CompareError> {
+///
+/// # Errors
+///
+/// [`CompareError`] when the model has no values or measures nothing, when there is no sample, when the
+/// simulation diverges, and when the work was cancelled.
+pub fn compare(
+    model: &Model,
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<Comparison, CompareError> {
+    let Measurements { runs, faults, .. } = *measurements;
     let missing = model.missing_values();
     if !missing.is_empty() {
         return Err(CompareError::MissingValues(
@@ -134,12 +113,14 @@ pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparis
         return Err(CompareError::NoSamples);
     }
     let values = model.values();
-    let runs = hold(model, &values, runs);
-    let initial = InitialStates::estimate(model, &values, &runs);
+    work.tell(Stage::Comparing, 0, runs.len() as u64);
+    let runs = hold(model, &values, runs, work)?;
+    let initial = InitialStates::estimate(model, &values, &runs, work)?;
     let mut tallies = vec![Tally::default(); model.measured.len()];
     let mut traces = Vec::with_capacity(runs.len());
     for (run, x0) in runs.iter().zip(&initial.states) {
-        traces.push(trace(model, &values, run, x0, &mut tallies)?);
+        traces.push(trace(model, &values, run, x0, &mut tallies, work)?);
+        work.tell(Stage::Comparing, traces.len() as u64, runs.len() as u64);
     }
     let signals: Vec<SignalScore> = tallies
         .iter()
@@ -155,7 +136,7 @@ pub fn compare(model: &Model, runs: &[Run], faults: &[Fault]) -> Result<Comparis
         signals,
         faults: faults.to_vec(),
         observer: Held::of(&runs),
-        where_it_fails: where_it_fails(model, &solution, &runs),
+        where_it_fails: where_it_fails(model, &solution, &runs, work)?,
         runs: traces,
     })
 }
@@ -166,6 +147,7 @@ fn trace(
     run: &Run,
     x0: &DVector<f64>,
     tallies: &mut [Tally],
+    work: &Work<'_>,
 ) -> Result<RunTrace, CompareError> {
     let n = run.len();
     let column = |of: &dyn Fn(usize) -> f64| (0..n).map(of).collect::<Vec<f64>>();
@@ -183,25 +165,26 @@ fn trace(
         .collect();
     let mut simulator = Simulator::new(model, values);
     let mut diverged = None;
-    free_run(&mut simulator, x0.as_slice(), run, |k, predicted| {
+    try_follow(&mut simulator, x0.as_slice(), run, |k, predicted, _| {
         for (signal, value) in signals.iter_mut().zip(predicted) {
             signal.free_run.push(*value);
         }
         if diverged.is_none() && predicted.iter().any(|v| !v.is_finite()) {
             diverged = Some(run.time[k]);
         }
-    });
+        work.go_on()
+    })?;
     if let Some(time) = diverged {
         return Err(CompareError::Diverged {
             run: run.name.clone(),
             time,
         });
     }
-    one_step(model, values, run, x0.as_slice(), |k, predicted| {
+    one_step(model, values, run, x0.as_slice(), work, |k, predicted| {
         for (signal, value) in signals.iter_mut().zip(predicted) {
             signal.one_step[k] = *value;
         }
-    });
+    })?;
     for (tally, signal) in tallies.iter_mut().zip(&signals) {
         for k in 0..n {
             tally.add(signal.measured[k], signal.free_run[k]);

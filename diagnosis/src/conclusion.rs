@@ -33,6 +33,8 @@ pub enum Conclusion {
     DataInsufficient,
     /// The recording is at fault.
     LogFaulty,
+    /// The work was cancelled: what was found until then is there, and nothing is concluded from it.
+    Cancelled,
 }
 
 /// An effect at its channels.
@@ -55,7 +57,8 @@ pub struct Explanation {
     /// The effect's parameters, by their ids.
     pub parameters: BTreeMap<String, Estimate>,
     /// How many standard errors it is from doing nothing: root of the likelihood ratio on all
-    /// samples that are independent of each other.
+    /// samples that are independent of each other; NaN (`null`) for one that was only looked at when the
+    /// work was cancelled.
     pub significance: f64,
     /// Candidates that these data cannot tell from it.
     pub indistinguishable_from: Vec<Place>,
@@ -64,7 +67,7 @@ pub struct Explanation {
     /// The model with it, fitted.
     #[serde(skip)]
     pub model: Model,
-    /// Free-run error on what it was fitted to.
+    /// Free-run error on what it was fitted to; NaN as `significance`.
     #[serde(skip)]
     pub nrmse_fit: f64,
 }

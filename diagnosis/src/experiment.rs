@@ -36,17 +36,19 @@ mod question;
 mod rival;
 mod shapes;
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use loopsight_model::model::Model;
-use loopsight_model::registry::BuildError;
 use loopsight_model::sensor::Sensor;
 use rayon::prelude::*;
 
 use crate::observer::unstable_at_rest;
 use crate::prediction::signal_rms;
+use crate::progress::{Cancelled, Stage, Work};
 pub use plan::{Considered, Drive, Limits, Plan, Promise, Question};
 pub use question::{QuestionError, place};
 use question::{Rivals, rivals};
-use rival::{information, response, rival, standard_errors};
+use rival::{Distance, information, response, rival, standard_errors};
 use shapes::Shape;
 
 /// Length at which experiments are compared, s.
@@ -77,11 +79,13 @@ const NOISE: f64 = 0.01;
 ///
 /// # Errors
 ///
-/// [`QuestionError`] when the question or the limits make no sense for this model.
+/// [`QuestionError`] when the question or the limits make no sense for this model, and when the work was
+/// cancelled.
 pub fn experiment(
     model: &Model,
     question: &Question,
     limits: &Limits,
+    work: &Work<'_>,
 ) -> Result<Plan, QuestionError> {
     question::check(model, limits)?;
     let mut model = model.clone();
@@ -89,7 +93,7 @@ pub fn experiment(
         .max_step
         .max(LOOK_STEP)
         .min(limits.period.max(model.max_step));
-    let design = Design::new(&model, *limits)?;
+    let design = Design::new(&model, *limits, work)?;
     match question {
         Question::Separate(a, b) => {
             design.separate(&rivals(&model, a, b.as_ref(), &design.rms, limits.limit)?)
@@ -112,15 +116,16 @@ struct Design<'m> {
     noise: Vec<f64>,
     /// Of the plant's signals under the usual experiment.
     rms: Vec<f64>,
+    work: &'m Work<'m>,
 }
 
 impl<'m> Design<'m> {
-    fn new(model: &'m Model, limits: Limits) -> Result<Self, QuestionError> {
+    fn new(model: &'m Model, limits: Limits, work: &'m Work<'m>) -> Result<Self, QuestionError> {
         let names: Vec<&'static str> = model.plant.inputs.iter().map(|s| s.id).collect();
         let drive =
             Shape::usual(names.len()).drive(&names, limits.limit, limits.period, HORIZON)?;
         let values = model.values();
-        let run = response(model, &values, &drive);
+        let run = response(model, &values, &drive, work)?;
         let noise = (0..run.n_measured)
             .map(|i| match &model.measured[i].sensor {
                 Sensor::EncoderCounts(encoder) => encoder.noise(limits.period),
@@ -134,8 +139,8 @@ impl<'m> Design<'m> {
             })
             .collect();
         let x0 = nalgebra::DVector::zeros(model.n_states());
-        let rms = signal_rms(model, &values, &[x0], &[run]);
-        let falls = unstable_at_rest(model, &values, &drive.time);
+        let rms = signal_rms(model, &values, &[x0], &[run], work)?;
+        let falls = unstable_at_rest(model, &values, &drive.time, work)?;
         if falls || rms.iter().any(|v| !v.is_finite()) {
             return Err(QuestionError::Unstable);
         }
@@ -145,23 +150,38 @@ impl<'m> Design<'m> {
             names,
             noise,
             rms,
+            work,
         })
     }
 
-    fn drive(&self, shape: Shape, duration: f64) -> Result<Drive, BuildError> {
-        shape.drive(&self.names, self.limits.limit, self.limits.period, duration)
+    fn drive(&self, shape: Shape, duration: f64) -> Result<Drive, QuestionError> {
+        let Limits { limit, period, .. } = self.limits;
+        Ok(shape.drive(&self.names, limit, period, duration)?)
+    }
+
+    /// One more experiment was tried.
+    fn tell(&self, done: &AtomicU64, of: usize) {
+        let now = done.fetch_add(1, Ordering::Relaxed) + 1;
+        self.work.tell(Stage::Experiments, now, of as u64);
     }
 
     /// Squared distances over time, the least of those of the directions; and the share of the
     /// effect's own distance that this is.
-    fn distance(&self, rivals: &Rivals, drive: &Drive, steps: usize, starts: usize) -> Apart {
+    fn distance(
+        &self,
+        rivals: &Rivals,
+        drive: &Drive,
+        steps: usize,
+        starts: usize,
+    ) -> Result<Apart, QuestionError> {
         let of = |truth: &(Model, Vec<f64>), other: &(Model, Vec<Vec<f64>>)| {
-            let run = response(&truth.0, &truth.1, drive);
+            let run = response(&truth.0, &truth.1, drive, self.work)?;
             let least = |model: &Model, from: &[Vec<f64>]| {
-                from.iter()
-                    .take(starts)
-                    .map(|start| rival(model, start, &run, &self.noise, steps))
-                    .min_by(|a, b| a.total.total_cmp(&b.total))
+                let fitted: Vec<Distance> = (from.iter().take(starts))
+                    .map(|start| rival(model, start, &run, &self.noise, steps, self.work))
+                    .collect::<Result<_, Cancelled>>()?;
+                let least = |a: &Distance, b: &Distance| a.total.total_cmp(&b.total);
+                Ok::<_, Cancelled>(fitted.into_iter().min_by(least))
             };
             // Whether an effect is there at all: a refit may hide it, so not after one.
             let own_steps = if rivals.places.len() > 1 { steps } else { 0 };
@@ -171,8 +191,9 @@ impl<'m> Design<'m> {
                 &run,
                 &self.noise,
                 own_steps,
-            );
-            let far = least(&other.0, &other.1).filter(|d| d.total < own.total);
+                self.work,
+            )?;
+            let far = least(&other.0, &other.1)?.filter(|d| d.total < own.total);
             let own_total = own.total;
             let far = far.unwrap_or(own);
             let share = if own_total > 0.0 {
@@ -180,29 +201,29 @@ impl<'m> Design<'m> {
             } else {
                 0.0
             };
-            Apart {
+            Ok(Apart {
                 by_sample: far.by_sample,
                 total: far.total,
                 share,
-            }
+            })
         };
-        rivals
-            .directions
-            .iter()
+        let ways: Vec<Apart> = (rivals.directions.iter())
             .map(|way| of(&way.truth, &way.rival))
-            .min_by(|a, b| a.total.total_cmp(&b.total))
-            .unwrap_or_default()
+            .collect::<Result<_, Cancelled>>()?;
+        let least = ways.into_iter().min_by(|a, b| a.total.total_cmp(&b.total));
+        Ok(least.unwrap_or_default())
     }
 
     /// The shapes under which every signal moves that moves under the usual one: a recording in
     /// which one does not carries no fit of the whole model.
-    fn moving(&self) -> Result<Vec<Shape>, BuildError> {
-        let moves = |shape: Shape| -> Result<Vec<bool>, BuildError> {
+    fn moving(&self) -> Result<Vec<Shape>, QuestionError> {
+        let moves = |shape: Shape| -> Result<Vec<bool>, QuestionError> {
             let run = response(
                 self.model,
                 &self.model.values(),
                 &self.drive(shape, HORIZON)?,
-            );
+                self.work,
+            )?;
             let power = |i: usize| {
                 (0..run.len())
                     .map(|k| run.sample(k)[i].powi(2))
@@ -230,15 +251,18 @@ impl<'m> Design<'m> {
     fn separate(&self, rivals: &Rivals) -> Result<Plan, QuestionError> {
         let horizon = self.limits.duration.unwrap_or(HORIZON);
         let look = |shapes: &[Shape], steps: usize, starts: usize| {
+            let done = AtomicU64::new(0);
             let mut all: Vec<(Shape, Apart)> = shapes
                 .par_iter()
                 .map(|shape| {
                     let drive = self.drive(*shape, horizon)?;
-                    Ok((*shape, self.distance(rivals, &drive, steps, starts)))
+                    let apart = self.distance(rivals, &drive, steps, starts)?;
+                    self.tell(&done, shapes.len());
+                    Ok((*shape, apart))
                 })
-                .collect::<Result<_, BuildError>>()?;
+                .collect::<Result<_, QuestionError>>()?;
             all.sort_by(|a, b| b.1.total.total_cmp(&a.1.total));
-            Ok::<_, BuildError>(all)
+            Ok::<_, QuestionError>(all)
         };
         let first = look(&self.moving()?, STEPS.0, 1)?;
         let best: Vec<Shape> = first.iter().take(BEST).map(|(shape, _)| *shape).collect();
@@ -263,7 +287,8 @@ impl<'m> Design<'m> {
             for _ in 0..6 {
                 duration = needed.clamp(LENGTHS.0, longest).ceil();
                 longest = (2.0 * duration).min(LENGTHS.1);
-                apart = self.distance(rivals, &self.drive(shape, duration)?, STEPS.1, usize::MAX);
+                let drive = self.drive(shape, duration)?;
+                apart = self.distance(rivals, &drive, STEPS.1, usize::MAX)?;
                 needed = self.needed(&apart, duration);
                 if apart.total.sqrt() >= SEPARATED || duration >= LENGTHS.1 {
                     break;
@@ -348,22 +373,28 @@ impl<'m> Design<'m> {
             }
         };
         // The largest relative standard error, and whose it is.
-        let worst = |drive: &Drive| -> (f64, usize) {
-            let errors =
-                standard_errors(&information(self.model, &values, drive, &free, &self.noise));
-            free.iter()
+        let worst = |drive: &Drive| -> Result<(f64, usize), QuestionError> {
+            let (model, noise) = (self.model, &self.noise);
+            let known = information(model, &values, drive, &free, noise, self.work)?;
+            let errors = standard_errors(&known);
+            let worst = free
+                .iter()
                 .zip(&errors)
                 .filter(|(i, _)| asked.contains(i))
                 .map(|(i, e)| (e * parameters[*i].scale() / reference(*i), *i))
-                .max_by(|a, b| a.0.total_cmp(&b.0))
-                .unwrap_or((f64::INFINITY, asked[0]))
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            Ok(worst.unwrap_or((f64::INFINITY, asked[0])))
         };
         let horizon = self.limits.duration.unwrap_or(HORIZON);
-        let mut all: Vec<(Shape, (f64, usize))> = self
-            .moving()?
+        let (shapes, done) = (self.moving()?, AtomicU64::new(0));
+        let mut all: Vec<(Shape, (f64, usize))> = shapes
             .par_iter()
-            .map(|shape| Ok((*shape, worst(&self.drive(*shape, horizon)?))))
-            .collect::<Result<_, BuildError>>()?;
+            .map(|shape| {
+                let worst = worst(&self.drive(*shape, horizon)?)?;
+                self.tell(&done, shapes.len());
+                Ok((*shape, worst))
+            })
+            .collect::<Result<_, QuestionError>>()?;
         all.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let considered = all
             .iter()
@@ -381,7 +412,7 @@ impl<'m> Design<'m> {
         if self.limits.duration.is_none() && !hopeless {
             for _ in 0..3 {
                 duration = needed(error, duration).clamp(LENGTHS.0, LENGTHS.1).ceil();
-                (error, at) = worst(&self.drive(shape, duration)?);
+                (error, at) = worst(&self.drive(shape, duration)?)?;
                 if error * PINNED <= 1.0 || duration >= LENGTHS.1 {
                     break;
                 }

@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
-use loopsight_recordings::Fault;
 use serde::Serialize;
 
-use crate::compare::{CompareError, Comparison, compare};
+use crate::compare::{Comparison, compare};
+use crate::derived::derived;
+use crate::error::{CompareError, FitError};
+use crate::measurements::Measurements;
+use crate::progress::{Cancelled, Work};
 use crate::regression::Scheme;
 
 /// How parameters are found.
@@ -57,6 +60,8 @@ pub enum Verdict {
     NotPinned,
     /// Rests on the end of its admissible range.
     AtBound,
+    /// The fit was cancelled before it could say.
+    Unfinished,
 }
 
 impl Verdict {
@@ -69,6 +74,7 @@ impl Verdict {
             Verdict::Flat => "only a combination with other parameters is determined",
             Verdict::NotPinned => "interval wider than the value",
             Verdict::AtBound => "at the end of its range",
+            Verdict::Unfinished => "the fit was cancelled",
         }
     }
 }
@@ -109,6 +115,10 @@ pub struct Fit {
     pub iterations: u64,
     /// Combinations of parameters that the data do not determine, in words.
     pub flat: Vec<String>,
+    /// The work was cancelled: these are the best values found until then. Errors of values and errors by
+    /// signal are missing where there was no time for them.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub cancelled: bool,
     /// The fitted model.
     #[serde(skip)]
     pub model: Model,
@@ -118,61 +128,105 @@ pub struct Fit {
     pub history: Vec<(String, Vec<(f64, f64)>)>,
 }
 
-/// Why a fit failed.
-#[derive(Debug, thiserror::Error)]
-pub enum FitError {
-    /// See [`CompareError`].
-    #[error(transparent)]
-    Compare(#[from] CompareError),
-    /// Nothing to estimate.
-    #[error("no parameter of the model is free: name some under `free` in [fit]")]
-    NothingFree,
-    /// Fewer samples than parameters.
-    #[error("{samples} samples cannot determine {parameters} parameters")]
-    TooFewSamples {
-        /// Usable samples.
-        samples: usize,
-        /// Free parameters.
-        parameters: usize,
-    },
-    /// Known parameters without a value.
-    #[error("the model gives no value for {}, and a fit does not estimate it: write it into the file, or name it under `free` in [fit]", .0.join(", "))]
-    Unknown(Vec<String>),
-    /// A parameter that the regression cannot estimate.
-    #[error(
-        "`{parameter}` enters the equations non-linearly: recursive least squares cannot estimate it; use --method output-error, or name it under `fixed` in [fit]"
-    )]
-    NotLinear {
-        /// Its name.
-        parameter: String,
-    },
-    /// The plant offers no regression.
-    #[error(
-        "the plant `{0}` declares no controlled states, so there is no regression for recursive least squares; use --method output-error"
-    )]
-    NoRegression(String),
-    /// The solver gave up.
-    #[error("the solver gave up: {0}")]
-    Solver(String),
-    /// The estimator's table is wrong.
-    #[error(transparent)]
-    Build(#[from] loopsight_model::registry::BuildError),
-    /// The estimator is not linked.
-    #[error("no estimator `{0}` is linked into this program")]
-    NoEstimator(String),
+impl Fit {
+    /// What is left of a fit that was cancelled: the values of `model`, which leave an error of `nrmse`.
+    pub(crate) fn cancelled(model: Model, method: Method, nrmse: f64, iterations: u64) -> Self {
+        let parameters = model.parameters.iter().filter_map(|parameter| {
+            let estimate = Estimate {
+                value: parameter.value?,
+                unit: parameter.unit.clone(),
+                std_error: None,
+                interval95: None,
+                verdict: if parameter.free {
+                    Verdict::Unfinished
+                } else {
+                    Verdict::Held
+                },
+            };
+            Some((parameter.name.clone(), estimate))
+        });
+        Self {
+            comparison: Comparison::of_error(nrmse),
+            parameters: parameters.collect(),
+            derived: derived(&model, None),
+            method,
+            nrmse_before: None,
+            nrmse_fit: nrmse,
+            iterations,
+            flat: Vec::new(),
+            cancelled: true,
+            model,
+            history: Vec::new(),
+        }
+    }
 }
 
-/// Fits the free parameters of `model` to `runs`; the comparison is on `test` where given.
+/// Fits the free parameters of `model` to the runs; the comparison is on the test runs where given.
 ///
-/// `progress` is called with the iteration and the present error (0 to 1 where it is a share).
+/// A fit that is cancelled returns the best values it has found ([`Fit::cancelled`]).
+///
+/// # Errors
+///
+/// [`FitError`] when there is nothing to fit or to fit to, when the model cannot be simulated from any
+/// starting point, and when the work was cancelled before the first simulation was done.
 pub fn fit(
     model: &Model,
-    runs: &[Run],
-    test: Option<&[Run]>,
-    faults: &[Fault],
+    measurements: &Measurements<'_>,
     settings: &FitSettings,
-    progress: &(dyn Fn(u64, f64) + Sync),
+    work: &Work<'_>,
 ) -> Result<Fit, FitError> {
+    let runs = measurements.runs;
+    check(model, runs)?;
+    let fitted_to = Measurements {
+        test: None,
+        ..*measurements
+    };
+    let before = match compare(model, &fitted_to, &work.silently()) {
+        Ok(comparison) => Some(comparison.nrmse),
+        Err(CompareError::Cancelled(cancelled)) => return Err(cancelled.into()),
+        Err(_) => None,
+    };
+    let mut result = match settings.method {
+        Method::Rls => crate::rls::fit(model, runs, settings, work)?,
+        Method::OutputError => crate::output_error::fit(model, runs, settings, work)?,
+    };
+    result.nrmse_before = before;
+    if result.cancelled {
+        return Ok(result);
+    }
+    match compared(&mut result, measurements, work) {
+        Err(CompareError::Cancelled(Cancelled)) => result.cancelled = true,
+        done => done?,
+    }
+    Ok(result)
+}
+
+/// Compares a fitted model with what it was fitted to, and with what it is judged on.
+fn compared(
+    result: &mut Fit,
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<(), CompareError> {
+    let on = |runs| {
+        let on = Measurements {
+            runs,
+            ..*measurements
+        };
+        compare(&result.model, &on, &work.silently())
+    };
+    let on_fit = on(measurements.runs)?;
+    let nrmse_fit = on_fit.nrmse;
+    let comparison = match measurements.test {
+        Some(test) => on(test),
+        None => Ok(on_fit),
+    };
+    result.nrmse_fit = nrmse_fit;
+    result.comparison = comparison?;
+    Ok(())
+}
+
+/// Whether there is something to fit, and something to fit it to.
+fn check(model: &Model, runs: &[Run]) -> Result<(), FitError> {
     if model.measured.is_empty() {
         return Err(CompareError::NothingMeasured.into());
     }
@@ -196,17 +250,5 @@ pub fn fit(
             parameters: free,
         });
     }
-    let before = compare(model, runs, &[]).ok().map(|c| c.nrmse);
-    let mut result = match settings.method {
-        Method::Rls => crate::rls::fit(model, runs, settings, progress)?,
-        Method::OutputError => crate::output_error::fit(model, runs, settings, progress)?,
-    };
-    result.nrmse_before = before;
-    let on_fit = compare(&result.model, runs, faults)?;
-    result.nrmse_fit = on_fit.nrmse;
-    result.comparison = match test {
-        Some(test) => compare(&result.model, test, faults)?,
-        None => on_fit,
-    };
-    Ok(result)
+    Ok(())
 }

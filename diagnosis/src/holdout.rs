@@ -6,6 +6,7 @@ use loopsight_model::run::Run;
 use crate::judge::Losses;
 use crate::prediction::{InitialStates, predict};
 use crate::problem::Solution;
+use crate::progress::{Cancelled, Work};
 use crate::score::Tally;
 
 /// Recordings divided into what a fit sees and what judges it.
@@ -52,26 +53,37 @@ impl<'a> Holdout<'a> {
     }
 
     /// Losses of a solution, in one pass over the data.
-    pub(crate) fn judge(&self, model: &Model, solution: &Solution) -> Judgement {
+    pub(crate) fn judge(
+        &self,
+        model: &Model,
+        solution: &Solution,
+        work: &Work<'_>,
+    ) -> Result<Judgement, Cancelled> {
         let Some(test) = self.test else {
-            let rank = losses(model, solution, self.runs, &self.std_test);
-            return Judgement {
+            let rank = losses(model, solution, self.runs, &self.std_test, work)?;
+            return Ok(Judgement {
                 losses: self.part(&rank, false),
                 rank,
-            };
+            });
         };
         let values = solution.values.clone();
-        let states = InitialStates::estimate(model, &values, test).states;
-        let losses = losses(model, &Solution { values, states }, test, &self.std_test);
+        let states = InitialStates::estimate(model, &values, test, work)?.states;
+        let on_test = Solution { values, states };
+        let losses = losses(model, &on_test, test, &self.std_test, work)?;
         let mut rank = losses.clone();
-        rank.extend(self.fitted(model, solution));
-        Judgement { losses, rank }
+        rank.extend(self.fitted(model, solution, work)?);
+        Ok(Judgement { losses, rank })
     }
 
     /// Losses on what was seen.
-    pub(crate) fn fitted(&self, model: &Model, solution: &Solution) -> Losses {
-        let all = losses(model, solution, self.runs, &self.std_fit);
-        self.part(&all, true)
+    pub(crate) fn fitted(
+        &self,
+        model: &Model,
+        solution: &Solution,
+        work: &Work<'_>,
+    ) -> Result<Losses, Cancelled> {
+        let all = losses(model, solution, self.runs, &self.std_fit, work)?;
+        Ok(self.part(&all, true))
     }
 
     /// Of the losses on all samples of `runs` those that a fit saw, or did not.
@@ -112,11 +124,17 @@ fn deviations(runs: &[Run], n: usize) -> Vec<f64> {
 }
 
 /// Losses on all samples of `runs`.
-fn losses(model: &Model, solution: &Solution, runs: &[Run], std: &[f64]) -> Losses {
+fn losses(
+    model: &Model,
+    solution: &Solution,
+    runs: &[Run],
+    std: &[f64],
+    work: &Work<'_>,
+) -> Result<Losses, Cancelled> {
     let n = std.len();
     let mut all = Losses::new();
     for (run, x0) in runs.iter().zip(&solution.states) {
-        let predicted = predict(model, &solution.values, x0.as_slice(), run);
+        let predicted = predict(model, &solution.values, x0.as_slice(), run, work)?;
         for k in 0..run.len() {
             let loss: f64 = (0..n)
                 .map(|i| {
@@ -128,5 +146,5 @@ fn losses(model: &Model, solution: &Solution, runs: &[Run], std: &[f64]) -> Loss
             all.push(loss / n as f64);
         }
     }
-    all
+    Ok(all)
 }

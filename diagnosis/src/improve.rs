@@ -1,13 +1,15 @@
 //! Diagnose, add, refit, until nothing more is missing.
 
 use loopsight_model::model::Model;
-use loopsight_model::run::Run;
-use loopsight_recordings::Fault;
 use serde::Serialize;
 
-use crate::conclusion::{Conclusion, Diagnosis, Place};
-use crate::diagnose::{LEAST, diagnose_above};
-use crate::fit::{Fit, FitError, FitSettings, fit};
+use crate::conclude::LEAST;
+use crate::conclusion::{Conclusion, Diagnosis, Explanation, Place};
+use crate::diagnose::diagnose_above;
+use crate::error::FitError;
+use crate::fit::{Fit, FitSettings, Method, fit};
+use crate::measurements::Measurements;
+use crate::progress::{Cancelled, Work};
 use crate::refine::refine;
 
 /// One step of an improvement.
@@ -64,66 +66,134 @@ const MOST: usize = 6;
 
 /// Repeats [`diagnose`](crate::diagnose()), adding what it finds missing, until it finds nothing more.
 ///
-/// `progress` gets the round, and the candidates done and in all.
+/// An improvement that is cancelled has the steps that were finished, the model of the last one as the
+/// best, and the verdict [`Conclusion::Cancelled`].
+///
+/// # Errors
+///
+/// [`FitError`] when the model as it is, or one of the improved models, cannot be fitted.
 pub fn improve(
     model: &Model,
-    runs: &[Run],
-    test: Option<&[Run]>,
-    faults: &[Fault],
-    progress: &(dyn Fn(usize, u64, u64) + Sync),
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
 ) -> Result<Improvement, FitError> {
-    let mut present = model.clone();
-    let mut steps: Vec<Step> = Vec::new();
-    let mut diagnoses = Vec::new();
-    let mut first = None;
+    let mut state = State::new(model);
     let verdict = loop {
-        let round = diagnoses.len();
-        let least = first.map_or(LEAST, |nrmse: f64| (WORTH * nrmse).max(LEAST));
-        let diagnosis = diagnose_above(&present, runs, test, faults, least, &|done, total| {
-            progress(round, done, total);
-        })?;
+        let diagnosis = state.diagnose(measurements, work)?;
         let verdict = diagnosis.verdict;
+        let round = state.diagnoses.len();
+        let next = match (&diagnosis.missing, diagnosis.candidates.first()) {
+            (Some(_), Some(best)) if round < MOST => Some(best.clone()),
+            _ => None,
+        };
+        state.diagnoses.push(diagnosis);
+        let Some(best) = next else { break verdict };
+        match state.add(best, round, measurements, work) {
+            Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
+            done => done?,
+        }
+    };
+    state.finish(verdict, measurements, work)
+}
+
+/// An improvement on its way.
+struct State {
+    present: Model,
+    steps: Vec<Step>,
+    diagnoses: Vec<Diagnosis>,
+}
+
+impl State {
+    fn new(model: &Model) -> Self {
+        Self {
+            present: model.clone(),
+            steps: Vec::new(),
+            diagnoses: Vec::new(),
+        }
+    }
+
+    /// Diagnoses the present model; the first time it is fitted by that, and the first step.
+    fn diagnose(
+        &mut self,
+        measurements: &Measurements<'_>,
+        work: &Work<'_>,
+    ) -> Result<Diagnosis, FitError> {
+        let round = self.diagnoses.len();
+        let first = self.diagnoses.first().map(|d| d.nominal.nrmse);
+        let least = first.map_or(LEAST, |nrmse| (WORTH * nrmse).max(LEAST));
+        let diagnosis = diagnose_above(&self.present, measurements, least, &work.in_round(round))?;
         if let Some(fitted) = &diagnosis.model
-            && steps.is_empty()
+            && self.steps.is_empty()
         {
-            first = Some(diagnosis.nominal.nrmse);
-            steps.push(Step {
+            self.steps.push(Step {
                 added: None,
                 round,
                 nrmse_fit: diagnosis.nominal_fit,
                 nrmse_test: diagnosis.nominal.nrmse,
             });
-            present = fitted.clone();
+            self.present = fitted.clone();
         }
-        let next = match (&diagnosis.missing, diagnosis.candidates.first()) {
-            (Some(_), Some(best)) if round < MOST => Some(best.clone()),
-            _ => None,
-        };
-        diagnoses.push(diagnosis);
-        let Some(best) = next else { break verdict };
-        steps.push(Step {
-            added: Some(best.place.clone()),
+        Ok(diagnosis)
+    }
+
+    /// Adds what the diagnosis of a `round` named, and puts right what that changes.
+    fn add(
+        &mut self,
+        best: Explanation,
+        round: usize,
+        measurements: &Measurements<'_>,
+        work: &Work<'_>,
+    ) -> Result<(), FitError> {
+        self.steps.push(Step {
+            added: Some(best.place),
             round,
             nrmse_fit: best.nrmse_fit,
             nrmse_test: best.nrmse,
         });
-        present = refine(best.model, &mut steps, &diagnoses[..round], runs, test)?;
-    };
-    let best = match verdict {
-        Conclusion::LogFaulty | Conclusion::DataInsufficient => None,
-        _ => Some(fit(
-            &present,
-            runs,
-            test,
-            faults,
-            &FitSettings::default(),
-            &|_, _| {},
-        )?),
-    };
-    Ok(Improvement {
-        steps,
-        verdict,
-        diagnoses,
-        best,
-    })
+        self.present = best.model;
+        let earlier = &self.diagnoses[..round];
+        let work = work.in_round(round);
+        refine(
+            &mut self.present,
+            &mut self.steps,
+            earlier,
+            measurements,
+            &work,
+        )
+    }
+
+    /// Fits the best model to all of the log; a cancelled one stays as it is.
+    fn finish(
+        self,
+        verdict: Conclusion,
+        measurements: &Measurements<'_>,
+        work: &Work<'_>,
+    ) -> Result<Improvement, FitError> {
+        let settings = FitSettings::default();
+        let unfitted = |model: Model, step: &Step| {
+            let error = step.nrmse_test;
+            Fit::cancelled(model, Method::OutputError, error, 0)
+        };
+        let (best, verdict) = match verdict {
+            Conclusion::LogFaulty | Conclusion::DataInsufficient => (None, verdict),
+            Conclusion::Cancelled => (None, verdict),
+            _ => match fit(&self.present, measurements, &settings, &work.silently()) {
+                Err(FitError::Cancelled(Cancelled)) => (None, Conclusion::Cancelled),
+                Ok(fit) if fit.cancelled => (Some(fit), Conclusion::Cancelled),
+                done => (Some(done?), verdict),
+            },
+        };
+        let best = match verdict {
+            Conclusion::Cancelled => {
+                best.or_else(|| self.steps.last().map(|step| unfitted(self.present, step)))
+            }
+            _ => best,
+        };
+        Ok(Improvement {
+            steps: self.steps,
+            verdict,
+            diagnoses: self.diagnoses,
+            best,
+        })
+    }
 }

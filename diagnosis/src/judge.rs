@@ -1,5 +1,7 @@
 //! Which of two models explains held-out data better, and whether that means anything.
 
+use crate::progress::{Cancelled, Work};
+
 /// Weighted squared errors of the samples that judge, in time order; runs stand one after the
 /// other.
 pub(crate) type Losses = Vec<f64>;
@@ -40,20 +42,24 @@ pub(crate) fn advantage(a: &Losses, b: &Losses) -> f64 {
 /// How sure it is that `with` explains more than `plain`, as a number of standard errors: the root of
 /// the likelihood ratio `N (plain/with - 1)` of two Gaussian models, with `N` the number of samples
 /// that are independent of each other, judged by the autocorrelation of the losses.
-pub(crate) fn significance(plain: &Losses, with: &Losses) -> f64 {
+pub(crate) fn significance(
+    plain: &Losses,
+    with: &Losses,
+    work: &Work<'_>,
+) -> Result<f64, Cancelled> {
     let ratio = plain.iter().sum::<f64>() / with.iter().sum::<f64>() - 1.0;
     if ratio > 0.0 {
-        (independent(with) * ratio).sqrt()
+        Ok((independent(with, work)? * ratio).sqrt())
     } else {
-        0.0
+        Ok(0.0)
     }
 }
 
 /// Number of samples over the sum of their autocorrelations (Bartlett's window).
-fn independent(losses: &Losses) -> f64 {
+fn independent(losses: &Losses, work: &Work<'_>) -> Result<f64, Cancelled> {
     let n = losses.len();
     if n < 8 {
-        return 1.0;
+        return Ok(1.0);
     }
     let mean = losses.iter().sum::<f64>() / n as f64;
     let lags = (2.0 * (n as f64).sqrt()) as usize;
@@ -66,13 +72,14 @@ fn independent(losses: &Losses) -> f64 {
     };
     let variance = gamma(0);
     if variance <= 0.0 {
-        return 1.0;
+        return Ok(1.0);
     }
     let mut time = 1.0;
     for lag in 1..=lags.min(n - 1) {
+        work.go_on()?;
         time += 2.0 * (1.0 - lag as f64 / (lags + 1) as f64) * gamma(lag) / variance;
     }
-    n as f64 / time.max(1.0)
+    Ok(n as f64 / time.max(1.0))
 }
 
 /// Root of the mean loss: the `nrmse` over the samples that judge.

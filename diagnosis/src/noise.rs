@@ -2,6 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use crate::progress::{Cancelled, Work};
+
 /// A first-order noise model `e(k) = a e(k-1) + ε(k) + c ε(k-1)` with white `ε`.
 ///
 /// Rounding to encoder counts and differencing gives `a = 0, c = -1`; a model error that lasts
@@ -20,7 +22,7 @@ const LARGEST_A: f64 = 0.999;
 
 impl Arma {
     /// Fits the model to the residuals of several runs (missing samples are zero).
-    pub(crate) fn fit(series: &[&[f64]]) -> Self {
+    pub(crate) fn fit(series: &[&[f64]], work: &Work<'_>) -> Result<Self, Cancelled> {
         let n: usize = series.iter().map(|s| s.len()).sum();
         if n < 10 {
             let variance = series
@@ -29,14 +31,15 @@ impl Arma {
                 .map(|e| e * e)
                 .sum::<f64>()
                 / n.max(1) as f64;
-            return Self {
+            return Ok(Self {
                 a: 0.0,
                 c: 0.0,
                 variance,
-            };
+            });
         }
-        let cost = |a: f64, c: f64| -> f64 {
-            series
+        let cost = |a: f64, c: f64| -> Result<f64, Cancelled> {
+            work.go_on()?;
+            let squares = series
                 .iter()
                 .map(|s| {
                     let (mut e_before, mut eps) = (0.0, 0.0);
@@ -48,13 +51,14 @@ impl Arma {
                     }
                     sum
                 })
-                .sum()
+                .sum();
+            Ok(squares)
         };
         // The surface is smooth but has a ridge along a = -c: a coarse grid, then a pattern search.
         let mut best = (f64::INFINITY, 0.0, 0.0);
         for a in [-0.6, 0.0, 0.5, 0.9, 0.98] {
             for c in [-1.0, -0.9, -0.5, 0.0, 0.5] {
-                let value = cost(a, c);
+                let value = cost(a, c)?;
                 if value < best.0 {
                     best = (value, a, c);
                 }
@@ -76,7 +80,7 @@ impl Arma {
             ] {
                 let a = (a + da * step).clamp(-LARGEST_A, LARGEST_A);
                 let c = (c + dc * step).clamp(-1.0, 0.99);
-                let value = cost(a, c);
+                let value = cost(a, c)?;
                 if value < better.0 {
                     better = (value, a, c);
                 }
@@ -87,11 +91,11 @@ impl Arma {
                 step *= 0.5;
             }
         }
-        Self {
+        Ok(Self {
             a: best.1,
             c: best.2,
             variance: best.0 / n as f64,
-        }
+        })
     }
 
     /// `ε = H⁻¹ e`.
@@ -153,16 +157,17 @@ pub(crate) fn covariance(
     n_signals: usize,
     inverse_gram: &DMatrix<f64>,
     unknowns: usize,
-) -> DMatrix<f64> {
+    work: &Work<'_>,
+) -> Result<DMatrix<f64>, Cancelled> {
     let models: Vec<Arma> = (0..n_signals)
         .map(|signal| {
             let series: Vec<&[f64]> = runs
                 .iter()
                 .map(|blocks| blocks[signal].residual.as_slice())
                 .collect();
-            Arma::fit(&series)
+            Arma::fit(&series, work)
         })
-        .collect();
+        .collect::<Result<_, Cancelled>>()?;
     let samples: usize = runs.iter().flatten().map(|b| b.residual.len()).sum();
     let lags = window(samples / n_signals.max(1));
     let columns = inverse_gram.ncols();
@@ -184,6 +189,7 @@ pub(crate) fn covariance(
         let n = scores.ncols();
         meat += &scores * scores.transpose();
         for lag in 1..=lags.min(n.saturating_sub(1)) {
+            work.go_on()?;
             let weight = 1.0 - lag as f64 / (lags + 1) as f64;
             let product =
                 scores.columns(lag, n - lag) * scores.columns(0, n - lag).transpose() * weight;
@@ -193,7 +199,7 @@ pub(crate) fn covariance(
     }
     // Degrees of freedom that the fit has used up.
     meat *= samples as f64 / (samples.saturating_sub(unknowns)).max(1) as f64;
-    inverse_gram * meat * inverse_gram
+    Ok(inverse_gram * meat * inverse_gram)
 }
 
 /// Lags whose covariances are looked at, for `n` samples: Newey and West's `1.3 n^(1/2)` is cut at
@@ -223,7 +229,7 @@ mod tests {
     fn differenced_rounding_is_recognised() {
         let q = white(3001, 1);
         let e: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
-        let model = Arma::fit(&[&e]);
+        let model = Arma::fit(&[&e], &Work::quiet()).unwrap();
         assert!(model.a.abs() < 0.1 && model.c < -0.97, "{model:?}");
         assert!((model.variance - 1.0 / 12.0).abs() < 0.01, "{model:?}");
     }
@@ -234,7 +240,7 @@ mod tests {
         for k in 1..e.len() {
             e[k] += 0.9 * e[k - 1];
         }
-        let model = Arma::fit(&[&e]);
+        let model = Arma::fit(&[&e], &Work::quiet()).unwrap();
         assert!(
             (model.a - 0.9).abs() < 0.03 && model.c.abs() < 0.1,
             "{model:?}"

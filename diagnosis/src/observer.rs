@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use crate::floor;
 use crate::growth::{Growth, Path, unstable};
+use crate::progress::{Cancelled, Work};
 
 /// How a free run was held to the measurements, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -84,24 +85,40 @@ const LEAST_NOISE: f64 = 1e-4;
 const FURTHEST: f64 = 1e3;
 
 /// `runs` with an observer each where `model` needs one; as they are where it does not.
-pub(crate) fn hold<'r>(model: &Model, values: &[f64], runs: &'r [Run]) -> Cow<'r, [Run]> {
-    growth(model, values, runs).map_or(Cow::Borrowed(runs), |growth| {
-        hold_with(model, values, runs, &growth)
-    })
+pub(crate) fn hold<'r>(
+    model: &Model,
+    values: &[f64],
+    runs: &'r [Run],
+    work: &Work<'_>,
+) -> Result<Cow<'r, [Run]>, Cancelled> {
+    match growth(model, values, runs, work)? {
+        Some(growth) => hold_with(model, values, runs, &growth, work),
+        None => Ok(Cow::Borrowed(runs)),
+    }
 }
 
 /// How errors of the state grow; `None` where they do not.
-pub(crate) fn growth(model: &Model, values: &[f64], runs: &[Run]) -> Option<Growth> {
+pub(crate) fn growth(
+    model: &Model,
+    values: &[f64],
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<Option<Growth>, Cancelled> {
     if runs.iter().any(|r| r.observer.is_some()) || values.iter().any(|v| !v.is_finite()) {
-        return None;
+        return Ok(None);
     }
     let design = Design::new(model, values, runs);
-    let paths: Vec<Path> = runs.iter().filter_map(|run| design.path(run)).collect();
-    Growth::of(&paths, &design.deviation)
+    let paths = design.paths(runs, work)?;
+    Ok(Growth::of(&paths, &design.deviation))
 }
 
 /// Whether `model` leaves its rest by itself within the instants `time`, at inputs of zero.
-pub(crate) fn unstable_at_rest(model: &Model, values: &[f64], time: &[f64]) -> bool {
+pub(crate) fn unstable_at_rest(
+    model: &Model,
+    values: &[f64],
+    time: &[f64],
+    work: &Work<'_>,
+) -> Result<bool, Cancelled> {
     let (n_inputs, n_measured) = (model.plant.inputs.len(), model.measured.len());
     let rest = [Run {
         time: time.to_vec(),
@@ -112,9 +129,7 @@ pub(crate) fn unstable_at_rest(model: &Model, values: &[f64], time: &[f64]) -> b
         ..Run::default()
     }];
     let design = Design::new(model, values, &rest);
-    rest.iter()
-        .filter_map(|run| design.path(run))
-        .any(|path| unstable(&path))
+    Ok(design.paths(&rest, work)?.iter().any(unstable))
 }
 
 /// `runs` with the observer that suits `growth`.
@@ -123,23 +138,35 @@ pub(crate) fn hold_with<'r>(
     values: &[f64],
     runs: &'r [Run],
     growth: &Growth,
-) -> Cow<'r, [Run]> {
+    work: &Work<'_>,
+) -> Result<Cow<'r, [Run]>, Cancelled> {
     let design = Design::new(model, values, runs);
-    let held: Option<Vec<Run>> = runs.iter().map(|run| design.hold(run, growth)).collect();
-    held.map_or(Cow::Borrowed(runs), Cow::Owned)
+    let mut held = Vec::with_capacity(runs.len());
+    for run in runs {
+        match design.hold(run, growth, work)? {
+            Some(run) => held.push(run),
+            None => return Ok(Cow::Borrowed(runs)),
+        }
+    }
+    Ok(Cow::Owned(held))
 }
 
 /// `others` with the observer that suits the horizon of `runs` and the `values` it was made for.
-pub(crate) fn hold_alike<'r>(model: &Model, others: &'r [Run], runs: &[Run]) -> Cow<'r, [Run]> {
+pub(crate) fn hold_alike<'r>(
+    model: &Model,
+    others: &'r [Run],
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<Cow<'r, [Run]>, Cancelled> {
     let Some(observer) = runs.iter().find_map(|run| run.observer.as_deref()) else {
-        return Cow::Borrowed(others);
+        return Ok(Cow::Borrowed(others));
     };
     let growth = Growth {
         horizon: observer.horizon,
         doubling: observer.doubling,
         observed: observer.observed.clone(),
     };
-    hold_with(model, &observer.values, others, &growth)
+    hold_with(model, &observer.values, others, &growth, work)
 }
 
 /// What the gains of an observer are found with.
@@ -173,30 +200,40 @@ impl<'a> Design<'a> {
         }
     }
 
-    /// The linearisations along the first samples of a run.
-    fn path(&self, run: &Run) -> Option<Path> {
-        let n = run.len().min(LOOKED_AT);
-        let fade = FIRST * run.median_period();
-        let mut path = Path::new(&run.time[..n]);
-        self.filter(run, n, fade, &self.certain(1.0), |step| path.push(step))?;
-        Some(path)
+    /// The linearisations along the first samples of each run, without those where they diverge.
+    fn paths(&self, runs: &[Run], work: &Work<'_>) -> Result<Vec<Path>, Cancelled> {
+        let mut paths = Vec::new();
+        for run in runs {
+            let n = run.len().min(LOOKED_AT);
+            let fade = FIRST * run.median_period();
+            let mut path = Path::new(&run.time[..n]);
+            let certain = self.certain(1.0);
+            let followed = self.filter(run, n, fade, &certain, work, |step| path.push(step))?;
+            if followed.is_some() {
+                paths.push(path);
+            }
+        }
+        Ok(paths)
     }
 
-    fn hold(&self, run: &Run, growth: &Growth) -> Option<Run> {
+    /// None where the filter diverges.
+    fn hold(&self, run: &Run, growth: &Growth, work: &Work<'_>) -> Result<Option<Run>, Cancelled> {
         let mut held = run.clone();
         let horizon = growth.horizon.max(SHORTEST * run.median_period());
         let nx = self.model.n_states();
         let stride = nx * run.n_measured;
         let mut gains = vec![0.0; stride * run.len()];
-        let mut uncertain = self.certain(1.0);
+        let uncertain = self.certain(1.0);
         let warm = run
             .time
             .iter()
             .position(|t| t - run.time[0] > 3.0 * horizon)
             .unwrap_or(run.len());
         // The initial state is estimated, so the gains begin as they go on.
-        uncertain = self.filter(run, warm, horizon, &uncertain, |_| {})?;
-        self.filter(run, run.len(), horizon, &uncertain, |step| {
+        let Some(uncertain) = self.filter(run, warm, horizon, &uncertain, work, |_| {})? else {
+            return Ok(None);
+        };
+        let last = self.filter(run, run.len(), horizon, &uncertain, work, |step| {
             let rows = gains[step.k * stride..].chunks_exact_mut(run.n_measured);
             for (row, to) in rows.take(nx).enumerate() {
                 for (column, gain) in to.iter_mut().enumerate() {
@@ -204,6 +241,9 @@ impl<'a> Design<'a> {
                 }
             }
         })?;
+        if last.is_none() {
+            return Ok(None);
+        }
         held.observer = Some(Arc::new(StateObserver {
             gains,
             observed: growth.observed.clone(),
@@ -212,7 +252,7 @@ impl<'a> Design<'a> {
             stride,
             values: self.values.to_vec(),
         }));
-        Some(held)
+        Ok(Some(held))
     }
 
     /// Uncertainty of the state before anything is known: many deviations of what is measured.
@@ -244,12 +284,13 @@ impl<'a> Design<'a> {
         samples: usize,
         fade: f64,
         uncertain: &DMatrix<f64>,
+        work: &Work<'_>,
         mut each: impl FnMut(&Step<'_>),
-    ) -> Option<DMatrix<f64>> {
+    ) -> Result<Option<DMatrix<f64>>, Cancelled> {
         let (nx, ny) = (self.model.n_states(), self.model.measured.len());
         let mut p = uncertain.clone();
         if run.len() < 2 {
-            return Some(p);
+            return Ok(Some(p));
         }
         let values: Vec<Dual> = self.values.iter().map(|v| Dual::of(*v)).collect();
         // As many simulators as it takes to carry the derivatives by all states.
@@ -266,6 +307,7 @@ impl<'a> Design<'a> {
         let (mut a, mut c) = (DMatrix::zeros(nx, nx), DMatrix::zeros(ny, nx));
         let mut innovation = DVector::zeros(ny);
         for k in 1..samples.min(run.len()) {
+            work.go_on()?;
             for (block, simulator) in simulators.iter_mut().enumerate() {
                 let first = block * DUAL_WIDTH;
                 for (i, state) in simulator.state_mut().iter_mut().enumerate() {
@@ -296,7 +338,10 @@ impl<'a> Design<'a> {
             p *= (2.0 * (run.time[k] - run.time[k - 1]) / fade).exp();
             let pc = &p * c.transpose();
             let s = &c * &pc + DMatrix::identity(ny, ny);
-            let mut gain = &a * &pc * s.clone().cholesky()?.inverse();
+            let Some(cholesky) = s.clone().cholesky() else {
+                return Ok(None);
+            };
+            let mut gain = &a * &pc * cholesky.inverse();
             p = &a * &p * a.transpose() - &gain * &s * gain.transpose();
             p = (&p + p.transpose()) * 0.5;
             for i in 0..nx {
@@ -315,7 +360,7 @@ impl<'a> Design<'a> {
                 }
             }
             if x.iter().any(|v| !v.is_finite()) {
-                return None;
+                return Ok(None);
             }
             for (mut column, noise) in gain.column_iter_mut().zip(&self.noise) {
                 column /= *noise;
@@ -331,7 +376,7 @@ impl<'a> Design<'a> {
                 gain: &gain,
             });
         }
-        Some(p)
+        Ok(Some(p))
     }
 }
 

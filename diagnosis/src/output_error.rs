@@ -10,12 +10,14 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::compare::Comparison;
 use crate::derived::{Known, derived};
-use crate::fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
+use crate::error::FitError;
+use crate::fit::{Estimate, Fit, FitSettings, Method, Verdict};
 use crate::flatness::Flatness;
 use crate::noise;
 use crate::observer::{growth, hold_with};
 use crate::prediction::InitialStates;
 use crate::problem::{Problem, declared};
+use crate::progress::{Cancelled, Work};
 use crate::regression::batch;
 use crate::solve::Effort;
 
@@ -41,22 +43,40 @@ pub(crate) fn fit(
     model: &Model,
     runs: &[Run],
     settings: &FitSettings,
-    progress: &(dyn Fn(u64, f64) + Sync),
+    work: &Work<'_>,
 ) -> Result<Fit, FitError> {
+    let prepared = prepare(model, runs, settings, work)?;
+    let mut problem = Problem::new(&prepared.model, &prepared.runs, work.clone())?;
+    match in_two_passes(&mut problem, settings) {
+        Err(FitError::Cancelled(cancelled)) => {
+            let (error, best) = problem.best().ok_or(cancelled)?;
+            let mut fitted = problem.model.clone();
+            fitted.set_values(&best.values);
+            let iterations = problem.evaluations.get();
+            Ok(Fit::cancelled(
+                fitted,
+                Method::OutputError,
+                error,
+                iterations,
+            ))
+        }
+        done => done,
+    }
+}
+
+fn in_two_passes(problem: &mut Problem<'_>, settings: &FitSettings) -> Result<Fit, FitError> {
     let effort = Effort {
         iterations: settings.max_iterations,
         ..Effort::FULL
     };
-    let prepared = prepare(model, runs, settings)?;
-    let mut problem = Problem::new(&prepared.model, &prepared.runs, progress)?;
     let start = problem.start(settings)?;
-    let start = problem.balance(start);
+    let start = problem.balance(start)?;
     let mut solution = problem.solve(&start, effort)?;
-    if let Some(start) = problem.whiten(&solution) {
-        let start = problem.balance(start);
+    if let Some(start) = problem.whiten(&solution)? {
+        let start = problem.balance(start)?;
         solution = problem.solve(&start, effort)?;
     }
-    Ok(problem.result(&solution))
+    Ok(problem.result(&solution)?)
 }
 
 /// A model and recordings that a fit can begin with.
@@ -83,30 +103,31 @@ pub(crate) fn prepare<'a>(
     model: &'a Model,
     runs: &'a [Run],
     settings: &FitSettings,
+    work: &Work<'_>,
 ) -> Result<Prepared<'a>, FitError> {
     let mut prepared = Prepared {
         model: Cow::Borrowed(model),
         runs: Cow::Borrowed(runs),
     };
-    let Some(mut values) = first_values(model, runs, settings) else {
+    let Some(mut values) = first_values(model, runs, settings, work)? else {
         return Ok(prepared);
     };
-    let Some(mut growth) = growth(model, &values, runs) else {
+    let Some(mut growth) = growth(model, &values, runs, work)? else {
         return Ok(prepared);
     };
     let mut present = model.clone();
     for share in ROUNDS {
         let mut shortened = growth.clone();
         shortened.horizon *= share;
-        prepared.runs = hold_with(model, &values, runs, &shortened);
+        prepared.runs = hold_with(model, &values, runs, &shortened, work)?;
         present.set_values(&values);
-        let mut problem = Problem::new(&present, &prepared.runs, &|_, _| {})?;
+        let mut problem = Problem::new(&present, &prepared.runs, work.silently())?;
         let states = InitialStates::guess(&present, &values, &prepared.runs).states;
         values = problem.solve_from(&values, &states, ROUND)?.values;
         // Once held, always held: what needs no observer with it may need one without.
-        growth = self::growth(model, &values, runs).unwrap_or(growth);
+        growth = self::growth(model, &values, runs, work)?.unwrap_or(growth);
     }
-    prepared.runs = hold_with(model, &values, runs, &growth);
+    prepared.runs = hold_with(model, &values, runs, &growth, work)?;
     present.set_values(&values);
     prepared.model = Cow::Owned(present);
     Ok(prepared)
@@ -114,14 +135,20 @@ pub(crate) fn prepare<'a>(
 
 /// The file's values, or those of a regression where it gives none; sizes of the declarations where
 /// the plant offers no regression.
-fn first_values(model: &Model, runs: &[Run], settings: &FitSettings) -> Option<Vec<f64>> {
+fn first_values(
+    model: &Model,
+    runs: &[Run],
+    settings: &FitSettings,
+    work: &Work<'_>,
+) -> Result<Option<Vec<f64>>, Cancelled> {
     if model.missing_values().is_empty() {
-        return Some(model.values());
+        return Ok(Some(model.values()));
     }
-    match batch(model, runs, settings.scheme, 0.0) {
-        Ok(values) => Some(values),
-        Err(FitError::NoRegression(_)) => Some(declared(model)),
-        Err(_) => None,
+    match batch(model, runs, settings.scheme, 0.0, work) {
+        Ok(values) => Ok(Some(values)),
+        Err(FitError::Cancelled(cancelled)) => Err(cancelled),
+        Err(FitError::NoRegression(_)) => Ok(Some(declared(model))),
+        Err(_) => Ok(None),
     }
 }
 
@@ -154,13 +181,13 @@ fn limit_rows(jacobian: &mut DMatrix<f64>) {
 
 impl Problem<'_> {
     /// The steepest row of the Jacobian over the one in the middle.
-    pub(crate) fn steepness(&self, at: &DVector<f64>) -> f64 {
-        let (norms, median) = row_norms(&self.linearise(at).1);
-        norms.into_iter().fold(0.0, f64::max) / median
+    pub(crate) fn steepness(&self, at: &DVector<f64>) -> Result<f64, Cancelled> {
+        let (norms, median) = row_norms(&self.linearise(at)?.1);
+        Ok(norms.into_iter().fold(0.0, f64::max) / median)
     }
 
     /// What is said of a solution.
-    pub(crate) fn result(&self, solution: &DVector<f64>) -> Fit {
+    pub(crate) fn result(&self, solution: &DVector<f64>) -> Result<Fit, Cancelled> {
         let (mut values, _) = self.unpack(solution);
         for i in &self.free {
             // The solver stays strictly inside the range; at its end the end is meant.
@@ -171,7 +198,7 @@ impl Problem<'_> {
                 }
             }
         }
-        let (residual, mut jacobian) = self.linearise(solution);
+        let (residual, mut jacobian) = self.linearise(solution)?;
         limit_rows(&mut jacobian);
         let gram = jacobian.tr_mul(&jacobian);
         let norms: Vec<f64> = (0..gram.ncols()).map(|i| gram[(i, i)].sqrt()).collect();
@@ -181,8 +208,8 @@ impl Problem<'_> {
         let flatness = Flatness::of(&gram, &norms, &self.named());
         let blocks = self.blocks(&residual, &jacobian);
         let inverse = flatness.inverse(&norms);
-        let covariance =
-            noise::covariance(&blocks, self.model.measured.len(), &inverse, norms.len());
+        let n_signals = self.model.measured.len();
+        let covariance = noise::covariance(&blocks, n_signals, &inverse, norms.len(), &self.work)?;
 
         let mut fitted = self.model.clone();
         fitted.set_values(&values);
@@ -236,17 +263,19 @@ impl Problem<'_> {
                 .collect(),
             quantile,
         };
-        Fit {
-            comparison: Comparison::empty(),
+        let error = self.best().map_or(f64::NAN, |(error, _)| error);
+        Ok(Fit {
+            comparison: Comparison::of_error(error),
             parameters,
             derived: derived(&fitted, Some(&known)),
             method: Method::OutputError,
             nrmse_before: None,
-            nrmse_fit: f64::NAN,
+            nrmse_fit: error,
             iterations: self.evaluations.get(),
             flat: flatness.words,
+            cancelled: false,
             model: fitted,
             history: Vec::new(),
-        }
+        })
     }
 }

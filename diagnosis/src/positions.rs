@@ -4,7 +4,7 @@ use loopsight_core::{EffectMeta, Role};
 use loopsight_model::model::{Model, pseudo_inverse};
 use loopsight_model::registry::HostReal;
 use loopsight_model::run::Run;
-use loopsight_model::simulate::{Simulator, free_run};
+use loopsight_model::simulate::{Simulator, try_follow};
 use nalgebra::DMatrix;
 
 /// Keeps the integrals of the plant (angles, ways) where the measurement has them, while the speeds
@@ -66,17 +66,17 @@ impl Positions {
         (!positions.direct.is_empty() || !positions.by_rate.is_empty()).then_some(positions)
     }
 
-    /// As [`free_run`], the positions corrected after each sample.
-    pub(crate) fn run<S: HostReal>(
+    /// As [`try_follow`], the positions corrected after each sample.
+    fn run<S: HostReal, E>(
         &self,
         simulator: &mut Simulator<'_, S>,
         x0: &[S],
         run: &Run,
         n_measured: usize,
-        mut each: impl FnMut(usize, &[S]),
-    ) {
+        mut each: impl FnMut(usize, &[S]) -> Result<(), E>,
+    ) -> Result<(), E> {
         let Some(&start) = run.time.first() else {
-            return;
+            return Ok(());
         };
         let mut predicted = vec![S::zero(); n_measured];
         simulator.reset(x0, run.input(0));
@@ -87,7 +87,7 @@ impl Positions {
                 simulator.advance_between(run.time[k] - start, run.input(k - 1), run.input(k));
             }
             simulator.measure(&mut predicted);
-            each(k, &predicted);
+            each(k, &predicted)?;
             let corrections = [(&self.direct, 1.0), (&self.by_rate, interval)];
             for (rows, factor) in corrections {
                 for (state, row) in rows {
@@ -100,23 +100,24 @@ impl Positions {
                 }
             }
         }
+        Ok(())
     }
 }
 
-/// The free run, with the positions as measured where they are given.
-pub(crate) fn run_with<S: HostReal>(
+/// The free run, with the positions as measured where they are given; an error of `each` ends it.
+pub(crate) fn run_with<S: HostReal, E>(
     positions: Option<&Positions>,
     simulator: &mut Simulator<'_, S>,
     x0: &[S],
     run: &Run,
     n_measured: usize,
-    each: impl FnMut(usize, &[S]),
-) {
+    mut each: impl FnMut(usize, &[S]) -> Result<(), E>,
+) -> Result<(), E> {
     match positions {
         // An observer holds the positions as well.
         Some(positions) if run.observer.is_none() => {
-            positions.run(simulator, x0, run, n_measured, each);
+            positions.run(simulator, x0, run, n_measured, each)
         }
-        _ => free_run(simulator, x0, run, each),
+        _ => try_follow(simulator, x0, run, |k, outputs, _| each(k, outputs)),
     }
 }

@@ -3,11 +3,12 @@
 use loopsight_core::Real;
 use loopsight_model::model::{Model, pseudo_inverse};
 use loopsight_model::run::Run;
-use loopsight_model::simulate::{Simulator, follow};
+use loopsight_model::simulate::{Simulator, try_follow};
 use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::{DMatrix, DVector};
 
 use crate::positions::{Positions, run_with};
+use crate::progress::{Cancelled, Work};
 
 /// Plant states whose initial values are estimated: those that show at the beginning of a run, and where
 /// the runs are held to the measurements all that those say something about. The others start at
@@ -28,6 +29,14 @@ pub(crate) struct Sensitivities {
     pub(crate) jacobian: DMatrix<f64>,
 }
 
+/// What a simulation is differentiated by, by index.
+#[derive(Clone, Copy)]
+pub(crate) struct By<'a> {
+    pub(crate) parameters: &'a [usize],
+    /// Initial states of the plant.
+    pub(crate) states: &'a [usize],
+}
+
 /// Simulates `run` from `x0`, differentiated by the parameters and initial states that are listed
 /// (forward mode, [`DUAL_WIDTH`] at a time).
 pub(crate) fn sensitivities(
@@ -35,10 +44,10 @@ pub(crate) fn sensitivities(
     values: &[f64],
     x0: &[f64],
     run: &Run,
-    parameters: &[usize],
-    states: &[usize],
-) -> Sensitivities {
-    sensitivities_with(None, model, values, x0, run, parameters, states)
+    by: By<'_>,
+    work: &Work<'_>,
+) -> Result<Sensitivities, Cancelled> {
+    sensitivities_with(None, model, values, x0, run, by, work)
 }
 
 /// As [`sensitivities`], with the positions as measured where they are given.
@@ -48,9 +57,10 @@ pub(crate) fn sensitivities_with(
     values: &[f64],
     x0: &[f64],
     run: &Run,
-    parameters: &[usize],
-    states: &[usize],
-) -> Sensitivities {
+    by: By<'_>,
+    work: &Work<'_>,
+) -> Result<Sensitivities, Cancelled> {
+    let By { parameters, states } = by;
     let columns = parameters.len() + states.len();
     let rows = run.len() * model.measured.len();
     let mut predicted = vec![0.0; rows];
@@ -82,6 +92,7 @@ pub(crate) fn sensitivities_with(
         let mut simulator = Simulator::new(model, &dual_values);
         let n = model.measured.len();
         run_with(positions, &mut simulator, &dual_x0, run, n, |k, outputs| {
+            work.go_on()?;
             for (i, output) in outputs.iter().enumerate() {
                 let row = k * outputs.len() + i;
                 predicted[row] = output.value();
@@ -89,17 +100,24 @@ pub(crate) fn sensitivities_with(
                     jacobian[(row, column)] = derivative(output, column - first);
                 }
             }
-        });
+            Ok(())
+        })?;
     }
-    Sensitivities {
+    Ok(Sensitivities {
         predicted,
         jacobian,
-    }
+    })
 }
 
 /// The free run over `run`, without derivatives; row by row as in [`Sensitivities::predicted`].
-pub(crate) fn predict(model: &Model, values: &[f64], x0: &[f64], run: &Run) -> Vec<f64> {
-    predict_with(None, model, values, x0, run)
+pub(crate) fn predict(
+    model: &Model,
+    values: &[f64],
+    x0: &[f64],
+    run: &Run,
+    work: &Work<'_>,
+) -> Result<Vec<f64>, Cancelled> {
+    predict_with(None, model, values, x0, run, work)
 }
 
 /// As [`predict`], with the positions as measured where they are given.
@@ -109,14 +127,16 @@ pub(crate) fn predict_with(
     values: &[f64],
     x0: &[f64],
     run: &Run,
-) -> Vec<f64> {
+    work: &Work<'_>,
+) -> Result<Vec<f64>, Cancelled> {
     let n = model.measured.len();
     let mut predicted = Vec::with_capacity(run.len() * n);
     let mut simulator = Simulator::new(model, values);
     run_with(positions, &mut simulator, x0, run, n, |_, outputs| {
-        predicted.extend_from_slice(outputs)
-    });
-    predicted
+        predicted.extend_from_slice(outputs);
+        work.go_on()
+    })?;
+    Ok(predicted)
 }
 
 /// Root mean squares of the plant's signals over the free runs.
@@ -125,19 +145,21 @@ pub(crate) fn signal_rms(
     values: &[f64],
     states: &[DVector<f64>],
     runs: &[Run],
-) -> Vec<f64> {
+    work: &Work<'_>,
+) -> Result<Vec<f64>, Cancelled> {
     let mut squares = vec![0.0; model.n_signals()];
     let mut n = 0.0f64;
     let mut simulator = Simulator::new(model, values);
     for (run, x0) in runs.iter().zip(states) {
-        follow(&mut simulator, x0.as_slice(), run, |_, _, now| {
+        try_follow(&mut simulator, x0.as_slice(), run, |_, _, now| {
             for (sum, value) in squares.iter_mut().zip(now.signals()) {
                 *sum += value * value;
             }
             n += 1.0;
-        });
+            work.go_on()
+        })?;
     }
-    squares.iter().map(|s| (s / n.max(1.0)).sqrt()).collect()
+    Ok(squares.iter().map(|s| (s / n.max(1.0)).sqrt()).collect())
 }
 
 /// Estimated initial plant states, one per run.
@@ -165,17 +187,28 @@ impl InitialStates {
     ///
     /// Only the beginning of a run tells anything about its initial state; two steps are exact to
     /// rounding where the plant is linear, and a step is taken only if it lowers the error.
-    pub(crate) fn estimate(model: &Model, values: &[f64], runs: &[Run]) -> Self {
+    pub(crate) fn estimate(
+        model: &Model,
+        values: &[f64],
+        runs: &[Run],
+        work: &Work<'_>,
+    ) -> Result<Self, Cancelled> {
         let mut initial = Self::guess(model, values, runs);
         let visible = estimated_states(model, values, runs);
         for (run, x0) in runs.iter().zip(&mut initial.states) {
             if run.len() < 2 {
                 continue;
             }
-            let cost = |x: &DVector<f64>| squares(&predict(model, values, x.as_slice(), run), run);
-            let mut best = cost(x0);
+            let cost = |x: &DVector<f64>| {
+                predict(model, values, x.as_slice(), run, work).map(|p| squares(&p, run))
+            };
+            let mut best = cost(x0)?;
             for _ in 0..3 {
-                let s = sensitivities(model, values, x0.as_slice(), run, &[], &visible);
+                let by = By {
+                    parameters: &[],
+                    states: &visible,
+                };
+                let s = sensitivities(model, values, x0.as_slice(), run, by, work)?;
                 let residual = residuals(&s.predicted, run);
                 let Some(step) = least_squares(&s.jacobian, &residual) else {
                     break;
@@ -184,7 +217,7 @@ impl InitialStates {
                 for (k, state) in visible.iter().enumerate() {
                     candidate[*state] += step[k];
                 }
-                let after = cost(&candidate);
+                let after = cost(&candidate)?;
                 if after >= best || after.is_nan() {
                     break;
                 }
@@ -196,7 +229,7 @@ impl InitialStates {
                 }
             }
         }
-        initial
+        Ok(initial)
     }
 }
 
@@ -231,14 +264,15 @@ pub(crate) fn one_step(
     values: &[f64],
     run: &Run,
     x0: &[f64],
+    work: &Work<'_>,
     mut each: impl FnMut(usize, &[f64]),
-) {
+) -> Result<(), Cancelled> {
     if run.len() < 2 {
-        return;
+        return Ok(());
     }
     let (jacobian, _) = model.measurement_jacobian(values, x0);
     let Some(inverse) = pseudo_inverse(&jacobian) else {
-        return;
+        return Ok(());
     };
     let mut free = Simulator::new(model, values);
     let mut outputs = vec![0.0; model.measured.len()];
@@ -247,6 +281,7 @@ pub(crate) fn one_step(
     free.reset(x0, run.input(0));
     let mut next = free.clone();
     for k in 1..run.len() {
+        work.go_on()?;
         free.measure(&mut before);
         for (i, (y, p)) in run.sample(k - 1).iter().zip(&before).enumerate() {
             innovation[i] = if y.is_finite() { y - p } else { 0.0 };
@@ -264,4 +299,5 @@ pub(crate) fn one_step(
         }
         free.advance_between(run.time[k], run.input(k - 1), run.input(k));
     }
+    Ok(())
 }

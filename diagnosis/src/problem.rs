@@ -6,13 +6,15 @@ use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::{FitError, FitSettings};
+use crate::error::FitError;
+use crate::fit::FitSettings;
 use crate::flatness::{DEAD, Named};
 use crate::noise::Block;
 use crate::positions::Positions;
 use crate::prediction::{
-    InitialStates, estimated_states, predict_with, residuals, sensitivities_with,
+    By, InitialStates, estimated_states, predict_with, residuals, sensitivities_with,
 };
+use crate::progress::{Cancelled, Work};
 use crate::regression::batch;
 use crate::score::Tally;
 
@@ -25,7 +27,7 @@ type Linearised = (DVector<f64>, DVector<f64>, DMatrix<f64>);
 pub(crate) struct Problem<'a> {
     pub(crate) model: &'a Model,
     pub(crate) runs: &'a [Run],
-    pub(crate) progress: &'a (dyn Fn(u64, f64) + Sync),
+    pub(crate) work: Work<'a>,
     /// Indices of the estimated parameters.
     pub(crate) free: Vec<usize>,
     /// Plant states whose initial values are estimated.
@@ -47,6 +49,8 @@ pub(crate) struct Problem<'a> {
     held: Option<Vec<DVector<f64>>>,
     /// The positions are as measured, not simulated.
     pub(crate) positions: Option<Positions>,
+    /// The best that was seen in the first pass, and the root of its cost.
+    best: RefCell<Option<(f64, Solution)>>,
 }
 
 /// What a fit found.
@@ -59,12 +63,8 @@ pub(crate) struct Solution {
 }
 
 impl<'a> Problem<'a> {
-    pub(crate) fn new(
-        model: &'a Model,
-        runs: &'a [Run],
-        progress: &'a (dyn Fn(u64, f64) + Sync),
-    ) -> Result<Self, FitError> {
-        Self::with(model, runs, None, None, progress)
+    pub(crate) fn new(model: &'a Model, runs: &'a [Run], work: Work<'a>) -> Result<Self, FitError> {
+        Self::with(model, runs, None, None, work)
     }
 
     /// As [`Problem::new`]; of each run only the samples that are `seen`, with initial states that
@@ -74,8 +74,9 @@ impl<'a> Problem<'a> {
         runs: &'a [Run],
         seen: Option<&'a [Vec<bool>]>,
         held: Option<Vec<DVector<f64>>>,
-        progress: &'a (dyn Fn(u64, f64) + Sync),
+        work: Work<'a>,
     ) -> Result<Self, FitError> {
+        work.go_on()?;
         let free: Vec<usize> = (0..model.parameters.len())
             .filter(|i| model.parameters[*i].free)
             .collect();
@@ -129,7 +130,7 @@ impl<'a> Problem<'a> {
         Ok(Self {
             model,
             runs,
-            progress,
+            work,
             free,
             visible,
             weights,
@@ -143,6 +144,7 @@ impl<'a> Problem<'a> {
             seen,
             held,
             positions: None,
+            best: RefCell::new(None),
         })
     }
 
@@ -155,8 +157,9 @@ impl<'a> Problem<'a> {
         }
         let mut failure = None;
         for span in SPANS {
-            match batch(self.model, self.runs, settings.scheme, span) {
+            match batch(self.model, self.runs, settings.scheme, span, &self.work) {
                 Ok(values) => candidates.push(values),
+                Err(FitError::Cancelled(cancelled)) => return Err(cancelled.into()),
                 Err(error) => failure = Some(error),
             }
         }
@@ -173,7 +176,7 @@ impl<'a> Problem<'a> {
                 None => InitialStates::guess(self.model, &values, self.runs).states,
             };
             let scaled = self.pack(&values, &initial);
-            let cost = self.residual_vector(&scaled).norm_squared();
+            let cost = self.residual_vector(&scaled)?.norm_squared();
             if cost.is_finite() && best.as_ref().is_none_or(|(least, _)| cost < *least) {
                 best = Some((cost, scaled));
             }
@@ -207,8 +210,8 @@ impl<'a> Problem<'a> {
 
     /// Scales the unknowns so that each moves the residuals alike, as the damping of the solver
     /// expects (J. J. Moré, 1978, "The Levenberg-Marquardt algorithm", section 6).
-    pub(crate) fn balance(&mut self, mut scaled: DVector<f64>) -> DVector<f64> {
-        let (residual, mut jacobian) = self.linearise(&scaled);
+    pub(crate) fn balance(&mut self, mut scaled: DVector<f64>) -> Result<DVector<f64>, Cancelled> {
+        let (residual, mut jacobian) = self.linearise(&scaled)?;
         for (i, mut column) in jacobian.column_iter_mut().enumerate() {
             let norm = column.norm();
             if norm > DEAD && norm.is_finite() {
@@ -222,7 +225,7 @@ impl<'a> Problem<'a> {
         // The same place in other units: there is nothing to be simulated again.
         self.cache
             .replace(Some((scaled.clone(), residual, jacobian)));
-        scaled
+        Ok(scaled)
     }
 
     /// Parameter values and initial states behind scaled unknowns.
@@ -260,12 +263,13 @@ impl<'a> Problem<'a> {
         self.weights[row % n_signals]
     }
 
-    pub(crate) fn residual_vector(&self, scaled: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn residual_vector(&self, scaled: &DVector<f64>) -> Result<DVector<f64>, Cancelled> {
         let (values, states) = self.unpack(scaled);
         let mut all = Vec::with_capacity(self.rows());
         for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
             let positions = self.positions.as_ref();
-            let predicted = predict_with(positions, self.model, &values, x0.as_slice(), run);
+            let (model, x0) = (self.model, x0.as_slice());
+            let predicted = predict_with(positions, model, &values, x0, run, &self.work)?;
             let mut residual = residuals(&predicted, run);
             for (row, value) in residual.iter_mut().enumerate() {
                 *value *= self.weight(index, row);
@@ -273,15 +277,35 @@ impl<'a> Problem<'a> {
             self.filter(index, residual.as_mut_slice(), scaled);
             all.extend_from_slice(residual.as_slice());
         }
-        DVector::from_vec(all)
+        let all = DVector::from_vec(all);
+        self.remember(&all, values, states);
+        Ok(all)
+    }
+
+    /// Keeps what leaves least, for when the work is cancelled.
+    fn remember(&self, residual: &DVector<f64>, values: Vec<f64>, states: Vec<DVector<f64>>) {
+        let error = residual.norm();
+        let mut best = self.best.borrow_mut();
+        let better = error.is_finite() && best.as_ref().is_none_or(|(least, _)| error < *least);
+        if better && self.rounding.is_empty() {
+            *best = Some((error, Solution { values, states }));
+        }
+    }
+
+    /// The best that was seen so far in the first pass, and its error relative to the standard deviation.
+    pub(crate) fn best(&self) -> Option<(f64, Solution)> {
+        self.best.borrow().clone()
     }
 
     /// Weighted residuals, and their Jacobian by the scaled unknowns.
-    pub(crate) fn linearise(&self, scaled: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    pub(crate) fn linearise(
+        &self,
+        scaled: &DVector<f64>,
+    ) -> Result<(DVector<f64>, DMatrix<f64>), Cancelled> {
         if let Some((at, residual, jacobian)) = self.cache.borrow().as_ref()
             && at == scaled
         {
-            return (residual.clone(), jacobian.clone());
+            return Ok((residual.clone(), jacobian.clone()));
         }
         let (values, states) = self.unpack(scaled);
         let n_free = self.free.len();
@@ -292,8 +316,12 @@ impl<'a> Problem<'a> {
         for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
             let x0 = x0.as_slice();
             let positions = self.positions.as_ref();
-            let (free, visible) = (&self.free, &self.visible);
-            let s = sensitivities_with(positions, self.model, &values, x0, run, free, visible);
+            let by = By {
+                parameters: &self.free,
+                states: &self.visible,
+            };
+            let (model, work) = (self.model, &self.work);
+            let s = sensitivities_with(positions, model, &values, x0, run, by, work)?;
             let residual = residuals(&s.predicted, run);
             for row in 0..residual.len() {
                 let finite = run.measured[row].is_finite();
@@ -315,8 +343,9 @@ impl<'a> Problem<'a> {
             self.filter_jacobian(index, first_row, rows, &mut jacobian);
             first_row += rows;
         }
+        self.remember(&all, values, states);
         *self.cache.borrow_mut() = Some((scaled.clone(), all.clone(), jacobian.clone()));
-        (all, jacobian)
+        Ok((all, jacobian))
     }
 
     /// The estimated parameters, for what is said of flat directions.

@@ -1,39 +1,41 @@
 //! What is put right in a model once another effect was added to it.
 
 use loopsight_model::model::{Attached, Model};
-use loopsight_model::run::Run;
 use rayon::prelude::*;
 
 use crate::candidates::{is_width, smooth};
 use crate::compare::compare;
+use crate::conclude::CLOSE;
 use crate::conclusion::{Diagnosis, Place};
-use crate::diagnose::CLOSE;
-use crate::fit::{FitError, FitSettings};
+use crate::error::FitError;
+use crate::fit::FitSettings;
 use crate::improve::Step;
+use crate::measurements::Measurements;
 use crate::output_error;
+use crate::progress::{Cancelled, Stage, Work};
 
-/// The model to go on from after the last of `steps`, fitted: what the last one made needless goes, and
-/// its step with it; simpler effects and others that the data could not tell from those of earlier
+/// Makes `model` the one to go on from after the last of `steps`, fitted: what the last one made needless
+/// goes, and its step with it; simpler effects and others that the data could not tell from those of earlier
 /// steps (by the `diagnoses` that added them) take their places where they may, and the steps then
-/// name them.
+/// name them. Where the work is cancelled, model and steps are those of the changes made until then.
 pub(crate) fn refine(
-    model: Model,
+    model: &mut Model,
     steps: &mut Vec<Step>,
     diagnoses: &[Diagnosis],
-    runs: &[Run],
-    test: Option<&[Run]>,
-) -> Result<Model, FitError> {
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<(), FitError> {
     let mut best = Refined {
         model,
         error: None,
-        runs,
-        test,
+        measurements,
+        work,
+        changes: 0,
     };
     needless(&mut best, steps)?;
     simplified(&mut best, steps)?;
     reconsidered(&mut best, steps, diagnoses)?;
-    sharpened(&mut best)?;
-    Ok(best.model)
+    sharpened(&mut best)
 }
 
 /// What an earlier step added goes where the error is the same without it: what looked like a dead zone
@@ -43,9 +45,9 @@ fn needless(best: &mut Refined<'_>, steps: &mut Vec<Step>) -> Result<(), FitErro
         // The last is what was just found missing.
         let earlier = steps.iter().enumerate().take(steps.len().saturating_sub(1));
         let candidates = earlier.filter_map(|(index, step)| {
-            let instances = instances(&best.model, step.added.as_ref()?);
+            let instances = instances(best.model, step.added.as_ref()?);
             instances.first()?;
-            Some((index, without(&best.model, &instances)?))
+            Some((index, without(best.model, &instances)?))
         });
         match best.takes(candidates.collect(), CLOSE)? {
             Some(index) => drop(steps.remove(index)),
@@ -67,7 +69,7 @@ fn without(model: &Model, effects: &[usize]) -> Option<Model> {
 /// The step that added it is then one that added the simpler effect.
 fn simplified(best: &mut Refined<'_>, steps: &mut [Step]) -> Result<(), FitError> {
     for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
-        let instances = instances(&best.model, place);
+        let instances = instances(best.model, place);
         let Some(effect) = instances.first().map(|i| &best.model.effects[*i]) else {
             continue;
         };
@@ -99,7 +101,7 @@ fn reconsidered(
         };
         let others = class.iter().flat_map(|c| &c.indistinguishable_from);
         let candidates =
-            others.filter_map(|other| Some((other, exchanged(&best.model, place, other)?)));
+            others.filter_map(|other| Some((other, exchanged(best.model, place, other)?)));
         if let Some(other) = best.takes(candidates.collect(), BETTER)? {
             *place = other.clone();
         }
@@ -133,11 +135,13 @@ fn exchanged(model: &Model, place: &Place, other: &Place) -> Option<Model> {
 
 /// A model, and others that may take its place.
 struct Refined<'a> {
-    model: Model,
+    model: &'a mut Model,
     /// Its error, once it was needed.
     error: Option<f64>,
-    runs: &'a [Run],
-    test: Option<&'a [Run]>,
+    measurements: &'a Measurements<'a>,
+    work: &'a Work<'a>,
+    /// Changes that were tried.
+    changes: u64,
 }
 
 impl Refined<'_> {
@@ -151,10 +155,13 @@ impl Refined<'_> {
         if candidates.is_empty() {
             return Ok(None);
         }
-        let refitted = |model: &Model| refitted(model, self.runs, self.test);
+        self.changes += candidates.len() as u64;
+        self.work.tell(Stage::Refining, self.changes, self.changes);
+        let silent = self.work.silently();
+        let refitted = |model: &Model| refitted(model, self.measurements, &silent);
         let now = match self.error {
             Some(now) => now,
-            None => refitted(&self.model)?.0,
+            None => refitted(self.model)?.0,
         };
         self.error = Some(now);
         let fitted: Vec<(T, f64, Model)> = candidates
@@ -164,9 +171,12 @@ impl Refined<'_> {
                 (error <= share * now).then_some((what, error, model))
             })
             .collect();
+        // Of changes that were not all tried none is the best.
+        self.work.go_on()?;
         let best = fitted.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
         Ok(best.map(|(what, error, model)| {
-            (self.model, self.error) = (model, Some(error));
+            *self.model = model;
+            self.error = Some(error);
             what
         }))
     }
@@ -188,15 +198,26 @@ const SIMPLER: f64 = 1.02;
 /// How much it must fall for another one: less may be what else is missing.
 const BETTER: f64 = 0.9;
 
+/// Iterations of a short fit.
+const SHORT: u64 = 20;
+
 /// The error of a model after a short fit, and the fitted model.
-fn refitted(model: &Model, runs: &[Run], test: Option<&[Run]>) -> Result<(f64, Model), FitError> {
+fn refitted(
+    model: &Model,
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<(f64, Model), FitError> {
     let settings = FitSettings {
-        max_iterations: 20,
+        max_iterations: SHORT,
         ..FitSettings::default()
     };
-    let fitted = output_error::fit(model, runs, &settings, &|_, _| {})?.model;
-    let error = compare(&fitted, test.unwrap_or(runs), &[])?.nrmse;
-    Ok((error, fitted))
+    let fitted = output_error::fit(model, measurements.runs, &settings, work)?;
+    if fitted.cancelled {
+        return Err(Cancelled.into());
+    }
+    let judging = Measurements::new(measurements.judging());
+    let error = compare(&fitted.model, &judging, work)?.nrmse;
+    Ok((error, fitted.model))
 }
 
 /// How much the error must fall for a sign to be smoothed over half as much.

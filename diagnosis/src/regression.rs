@@ -1,22 +1,12 @@
 //! Regressions over whole recordings.
 
 use loopsight_model::model::{Model, pseudo_inverse};
-use loopsight_model::regression::RegressionError;
 pub use loopsight_model::regression::{Regression, Scheme};
 use loopsight_model::run::{Hold, Run};
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::FitError;
-
-impl From<RegressionError> for FitError {
-    fn from(error: RegressionError) -> Self {
-        match error {
-            RegressionError::NoControlledStates(plant) => FitError::NoRegression(plant),
-            RegressionError::NotLinear(parameter) => FitError::NotLinear { parameter },
-            RegressionError::Unknown(parameter) => FitError::Unknown(vec![parameter]),
-        }
-    }
-}
+use crate::error::FitError;
+use crate::progress::{Cancelled, Work};
 
 /// Calls `each(row, time, φ, y)` for every regression that the samples of `runs` give.
 ///
@@ -26,14 +16,16 @@ pub(crate) fn for_each_row(
     regression: &mut Regression,
     runs: &[Run],
     span: f64,
+    work: &Work<'_>,
     mut each: impl FnMut(usize, f64, &[f64], f64),
-) {
+) -> Result<(), Cancelled> {
     let mut offset = 0.0;
     for run in runs {
         regression.restart();
         let mut input = vec![0.0; run.n_inputs];
         let mut last = 0;
         for k in 0..run.len() {
+            work.go_on()?;
             if k > 0 && run.time[k] - run.time[last] < span {
                 continue;
             }
@@ -61,6 +53,7 @@ pub(crate) fn for_each_row(
         }
         offset += run.duration();
     }
+    Ok(())
 }
 
 /// Ordinary least squares over all samples: a starting point for a fit that needs one.
@@ -72,6 +65,7 @@ pub(crate) fn batch(
     runs: &[Run],
     scheme: Scheme,
     span: f64,
+    work: &Work<'_>,
 ) -> Result<Vec<f64>, FitError> {
     let mut linear = model.clone();
     for parameter in &mut linear.parameters {
@@ -86,7 +80,7 @@ pub(crate) fn batch(
             (DMatrix::zeros(n, n), DVector::zeros(n))
         })
         .collect();
-    for_each_row(&mut regression, runs, span, |row, _, phi, y| {
+    for_each_row(&mut regression, runs, span, work, |row, _, phi, y| {
         let (gram, right) = &mut grams[row];
         for (i, a) in phi.iter().enumerate() {
             right[i] += a * y;
@@ -94,7 +88,7 @@ pub(crate) fn batch(
                 gram[(i, j)] += a * b;
             }
         }
-    });
+    })?;
     let mut values: Vec<f64> = linear
         .parameters
         .iter()

@@ -10,7 +10,9 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::compare::Comparison;
 use crate::derived::derived;
-use crate::fit::{Estimate, Fit, FitError, FitSettings, Method, Verdict};
+use crate::error::FitError;
+use crate::fit::{Estimate, Fit, FitSettings, Method, Verdict};
+use crate::progress::{Stage, Work};
 use crate::regression::{Regression, for_each_row};
 
 /// Samples of the estimate's history that are kept for pictures.
@@ -24,7 +26,7 @@ pub(crate) fn fit(
     model: &Model,
     runs: &[Run],
     settings: &FitSettings,
-    progress: &(dyn Fn(u64, f64) + Sync),
+    work: &Work<'_>,
 ) -> Result<Fit, FitError> {
     let mut regression = Regression::new(model, settings.scheme)?;
     let mut estimators = Vec::new();
@@ -48,7 +50,7 @@ pub(crate) fn fit(
             Some(first)
         })
         .collect();
-    for_each_row(&mut regression, runs, 0.0, |row, time, phi, y| {
+    let done = for_each_row(&mut regression, runs, 0.0, work, |row, time, phi, y| {
         let innovation = estimators[row].update(phi, y);
         if !innovation.accepted {
             return;
@@ -60,7 +62,7 @@ pub(crate) fn fit(
         if row == 0 {
             samples += 1;
             if samples.is_multiple_of(256) {
-                progress(samples, samples as f64 / total as f64);
+                work.tell(Stage::Fitting, samples, total as u64);
             }
         }
         if samples.is_multiple_of(every as u64) {
@@ -120,7 +122,7 @@ pub(crate) fn fit(
     let mut fitted = model.clone();
     fitted.set_values(&values);
     Ok(Fit {
-        comparison: Comparison::empty(),
+        comparison: Comparison::of_error(f64::NAN),
         parameters,
         derived: derived(&fitted, None),
         method: Method::Rls,
@@ -128,6 +130,7 @@ pub(crate) fn fit(
         nrmse_fit: f64::NAN,
         iterations: samples,
         flat: Vec::new(),
+        cancelled: done.is_err(),
         model: fitted,
         history,
     })

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::noise;
 use crate::problem::Problem;
+use crate::progress::Cancelled;
 
 /// A residual whose noise model has `c` below this and `a` within ±[`SLOW`] is rounded counts.
 const ROUNDED: f64 = -0.8;
@@ -13,8 +14,11 @@ const SLOW: f64 = 0.3;
 impl Problem<'_> {
     /// Turns to the second pass if the residuals at `solution` are rounded counts; returns where it
     /// starts.
-    pub(crate) fn whiten(&mut self, solution: &DVector<f64>) -> Option<DVector<f64>> {
-        let (residual, jacobian) = self.linearise(solution);
+    pub(crate) fn whiten(
+        &mut self,
+        solution: &DVector<f64>,
+    ) -> Result<Option<DVector<f64>>, Cancelled> {
+        let (residual, jacobian) = self.linearise(solution)?;
         let blocks = self.blocks(&residual, &jacobian);
         let n_signals = self.weights.len();
         let rounding: Vec<f64> = (0..n_signals)
@@ -23,13 +27,13 @@ impl Problem<'_> {
                     .iter()
                     .map(|b| b[signal].residual.as_slice())
                     .collect();
-                let model = noise::Arma::fit(&series);
+                let model = noise::Arma::fit(&series, &self.work)?;
                 let rounded = model.c < ROUNDED && model.a.abs() < SLOW;
-                if rounded { model.c } else { 0.0 }
+                Ok(if rounded { model.c } else { 0.0 })
             })
-            .collect();
+            .collect::<Result<_, Cancelled>>()?;
         if rounding.iter().all(|c| *c == 0.0) {
-            return None;
+            return Ok(None);
         }
         self.rounding = rounding;
         self.cache.replace(None);
@@ -45,7 +49,8 @@ impl Problem<'_> {
             .upper
             .clone()
             .resize_vertically(self.scales.len(), f64::INFINITY);
-        Some(solution.clone().resize_vertically(self.scales.len(), 0.0))
+        let start = solution.clone();
+        Ok(Some(start.resize_vertically(self.scales.len(), 0.0)))
     }
 
     /// First of the unknowns `ε` before the runs.

@@ -3,18 +3,17 @@
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use rayon::prelude::*;
 
 use crate::candidates::Candidate;
-use crate::diagnose::CLOSE;
-use crate::fit::Fit;
-use crate::holdout::Holdout;
-use crate::judge::{Losses, nrmse};
-use crate::problem::Solution;
+use crate::conclude::CLOSE;
+use crate::conclusion::Explanation;
+use crate::explain::explain;
+use crate::judge::nrmse;
+use crate::progress::{Stage, Work};
 use crate::starts::{first_starts, grown_starts};
-use crate::trial::{Judged, finish, look, promise};
+use crate::trial::{Judged, Nominal, finish, look, promise};
 
 /// Candidates that are fitted to the end.
 const FINALISTS: usize = 9;
@@ -43,68 +42,104 @@ const WORTH_DIVIDING: f64 = 0.8;
 /// A candidate by its index, and where to start it from.
 type Attempt = (usize, Vec<f64>);
 
-/// Everything that a search among candidates goes by.
+/// A search among candidates.
 pub(crate) struct Search<'a> {
     pub(crate) all: &'a [Candidate],
-    pub(crate) holdout: &'a Holdout<'a>,
-    /// The plain model, its fit, what that leaves of the cost, and its losses.
-    pub(crate) model: &'a Model,
-    pub(crate) nominal: &'a Solution,
-    pub(crate) cost: f64,
-    pub(crate) rank: &'a Losses,
+    pub(crate) nominal: &'a Nominal<'a>,
+    pub(crate) work: &'a Work<'a>,
+}
+
+/// What a search found.
+#[derive(Default)]
+pub(crate) struct Found {
+    /// The candidates that do best, fitted to the end and explained, the best first.
+    pub(crate) finalists: Vec<(Judged, Explanation)>,
+    /// Where the work was cancelled: those that were looked at, the best first.
+    pub(crate) looked: Vec<Judged>,
 }
 
 impl Search<'_> {
-    /// The candidates that do best, fitted to the end, the best first.
+    /// The candidates that do best.
     ///
     /// All are asked what one step promises, some are looked at, those that contain one that did well
     /// from where that one ended; the best are fitted.
-    pub(crate) fn finalists(&self, progress: &(dyn Fn(u64, u64) + Sync)) -> Vec<(Judged, Fit)> {
-        let runs = self.holdout.runs.iter();
+    pub(crate) fn run(&self) -> Found {
+        let looked = self.looked_at();
+        if self.work.is_cancelled() {
+            let finalists = Vec::new();
+            let looked = best_first(looked);
+            return Found { finalists, looked };
+        }
+        let contest = contest(looked);
+        let of = contest.len() as u64;
+        let done = AtomicU64::new(0);
+        self.work.tell(Stage::Finalists, 0, of);
+        let mut finalists: Vec<(Judged, Explanation)> = contest
+            .par_iter()
+            .filter_map(|first| {
+                let (judged, fit) = finish(first.clone(), self.nominal)?;
+                let explanation = explain(&judged, &fit, self.nominal).ok()?;
+                self.tell(Stage::Finalists, &done, of);
+                Some((judged, explanation))
+            })
+            .collect();
+        finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
+        let looked = if self.work.is_cancelled() {
+            contest
+        } else {
+            Vec::new()
+        };
+        Found { finalists, looked }
+    }
+
+    /// One more is done of a stage.
+    fn tell(&self, stage: Stage, done: &AtomicU64, of: u64) {
+        let now = done.fetch_add(1, Ordering::Relaxed) + 1;
+        self.work.tell(stage, now.min(of), of);
+    }
+
+    /// All that were looked at, by their indices.
+    fn looked_at(&self) -> Vec<(usize, Judged)> {
+        let runs = self.nominal.holdout.runs.iter();
         let duration = runs.map(Run::duration).fold(0.0, f64::max);
         let attempts: Vec<Attempt> = (self.all.iter().enumerate())
             .filter(|(_, c)| !c.separate)
             .flat_map(|(i, c)| {
-                let starts = first_starts(c, self.model, duration);
+                let starts = first_starts(c, self.nominal.model, duration);
                 starts.into_iter().map(move |start| (i, start))
             })
             .collect();
-        let (done, total) = (AtomicU64::new(0), (attempts.len() + LOOKED_AT) as u64);
-        let tick = || progress(total.min(done.fetch_add(1, Ordering::Relaxed) + 1), total);
-
-        let promising = self.promising(attempts, &tick);
+        let promising = self.promising(attempts);
         let simple = |i: usize| !promising.iter().any(|(j, _)| self.grows(i, *j));
         let (first, mut waiting): (Vec<Attempt>, Vec<Attempt>) =
             promising.iter().cloned().partition(|(i, _)| simple(*i));
         let mut tried: BTreeSet<usize> = first.iter().map(|(i, _)| *i).collect();
-        let mut looked = self.looks(&first, &tick);
+        let mut looked = Vec::new();
+        self.look_at(&first, waiting.len(), &mut looked);
         // What contains another candidate is looked at after it, from where that one ended; as it promised
         // only where that one led nowhere.
-        loop {
+        while !self.work.is_cancelled() {
             let mut next = self.grown(&looked, &tried, &mut waiting, duration);
             next.append(&mut waiting);
             if next.is_empty() {
                 break;
             }
             tried.extend(next.iter().map(|(i, _)| *i));
-            looked.extend(self.looks(&next, &tick));
+            self.look_at(&next, 0, &mut looked);
         }
-        let mut finalists: Vec<(Judged, Fit)> = contest(looked)
-            .into_par_iter()
-            .filter_map(|first| finish(first, self.holdout, self.nominal))
-            .collect();
-        finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
-        finalists
+        looked
     }
 
     /// The starts that promise most, the best first.
-    fn promising(&self, attempts: Vec<Attempt>, tick: &(dyn Fn() + Sync)) -> Vec<Attempt> {
+    fn promising(&self, attempts: Vec<Attempt>) -> Vec<Attempt> {
+        let (done, of) = (AtomicU64::new(0), attempts.len() as u64);
+        self.work.tell(Stage::Promises, 0, of);
         let mut promising: Vec<(f64, Attempt)> = attempts
             .into_par_iter()
             .filter_map(|(i, start)| {
                 let candidate = self.all[i].chosen(&start);
-                let promise = promise(&candidate, &start, self.holdout, self.nominal, self.cost);
-                tick();
+                let promise = promise(&candidate, &start, self.nominal);
+                self.tell(Stage::Promises, &done, of);
                 Some((promise?, (i, start)))
             })
             .collect();
@@ -119,20 +154,17 @@ impl Search<'_> {
         promising.into_iter().map(|(_, attempt)| attempt).collect()
     }
 
-    fn looks(&self, attempts: &[Attempt], tick: &(dyn Fn() + Sync)) -> Vec<(usize, Judged)> {
-        attempts
-            .par_iter()
-            .filter_map(|(i, start)| {
-                let found = look(
-                    &self.all[*i].chosen(start),
-                    start,
-                    self.holdout,
-                    self.nominal,
-                );
-                tick();
-                Some((*i, found?))
-            })
-            .collect()
+    /// Looks at some attempts; so many more are `waiting`.
+    fn look_at(&self, attempts: &[Attempt], waiting: usize, looked: &mut Vec<(usize, Judged)>) {
+        let done = AtomicU64::new(looked.len() as u64);
+        let of = (looked.len() + attempts.len() + waiting) as u64;
+        self.work.tell(Stage::FirstLooks, looked.len() as u64, of);
+        let found = attempts.par_iter().filter_map(|(i, start)| {
+            let found = look(&self.all[*i].chosen(start), start, self.nominal);
+            self.tell(Stage::FirstLooks, &done, of);
+            Some((*i, found?))
+        });
+        looked.extend(found.collect::<Vec<_>>());
     }
 
     /// Whether a candidate may be found from where another one ended: strong breakaway friction is
@@ -168,7 +200,7 @@ impl Search<'_> {
                 found.candidate.meta.id == simpler.candidate.meta.id && !found.candidate.separate
             });
             let elsewhere = error > ELSEWHERE * least(places);
-            let divided = error < WORTH_DIVIDING * nrmse(self.rank);
+            let divided = error < WORTH_DIVIDING * nrmse(self.nominal.rank);
             let starts = grown_starts(candidate, simpler, duration);
             let worth = error < WORTH_GROWING * least_of_all
                 && (!candidate.separate || divided)
@@ -187,6 +219,14 @@ impl Search<'_> {
 /// The least error among some candidates.
 fn least<'j>(found: impl Iterator<Item = &'j Judged>) -> f64 {
     found.map(Judged::error).fold(f64::INFINITY, f64::min)
+}
+
+/// The candidates that were looked at, each from its best start, the best first.
+fn best_first(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
+    looked.sort_by(|a, b| a.1.error().total_cmp(&b.1.error()));
+    let mut seen = BTreeSet::new();
+    looked.retain(|(i, _)| seen.insert(*i));
+    looked.into_iter().map(|(_, judged)| judged).collect()
 }
 
 /// Those of the candidates looked at that are fitted to the end, the best first.

@@ -1,15 +1,14 @@
 //! The solution of a least-squares problem: Levenberg–Marquardt within bounds.
 
-use std::convert::Infallible;
-
 use basin::{
-    BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet, Constraints,
-    Executor, Jacobian, Residual,
+    BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet,
+    ConstraintSolveError, Constraints, Executor, Jacobian, Residual,
 };
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::FitError;
+use crate::error::FitError;
 use crate::problem::{Problem, Solution};
+use crate::progress::{Cancelled, Stage};
 
 /// How hard a fit tries.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +36,7 @@ impl Problem<'_> {
         effort: Effort,
     ) -> Result<Solution, FitError> {
         let start = self.pack(values, states);
-        let start = self.balance(start);
+        let start = self.balance(start)?;
         self.finish(&start, effort)
     }
 
@@ -61,11 +60,12 @@ impl Problem<'_> {
             .with_tau(1e-6)
             .with_relative_cost_change_tolerance(effort.tolerance)
             .with_relative_step_tolerance(1e-10);
-        let result = Executor::from_start(Borrowed(self), solver, start.clone())
+        let result = Executor::from_start(Borrowed(self, effort), solver, start.clone())
             .max_iter(effort.iterations)
             .run();
         let result = match result {
             Ok(result) => result,
+            Err(ConstraintSolveError::Evaluation(cancelled)) => return Err(cancelled.into()),
             Err(error) => return Err(FitError::Solver(error.to_string())),
         };
         let solution = result.param().clone();
@@ -79,30 +79,33 @@ impl Problem<'_> {
 }
 
 /// The problem as the solver sees it.
-struct Borrowed<'p, 'a>(&'p Problem<'a>);
+struct Borrowed<'p, 'a>(&'p Problem<'a>, Effort);
 
 impl Residual for Borrowed<'_, '_> {
     type Param = DVector<f64>;
     type Output = DVector<f64>;
-    type Error = Infallible;
-    fn residual(&self, scaled: &DVector<f64>) -> Result<DVector<f64>, Infallible> {
-        Ok(self.0.residual_vector(scaled))
+    type Error = Cancelled;
+    fn residual(&self, scaled: &DVector<f64>) -> Result<DVector<f64>, Cancelled> {
+        self.0.residual_vector(scaled)
     }
 }
 
 impl Jacobian for Borrowed<'_, '_> {
     type Jacobian = DMatrix<f64>;
-    fn jacobian(&self, scaled: &DVector<f64>) -> Result<DMatrix<f64>, Infallible> {
+    fn jacobian(&self, scaled: &DVector<f64>) -> Result<DMatrix<f64>, Cancelled> {
         Ok(self.residual_and_jacobian(scaled)?.1)
     }
     /// The simulation that differentiates predicts as well.
     fn residual_and_jacobian(
         &self,
         scaled: &DVector<f64>,
-    ) -> Result<(DVector<f64>, DMatrix<f64>), Infallible> {
-        let (residual, jacobian) = self.0.linearise(scaled);
-        self.0.evaluations.set(self.0.evaluations.get() + 1);
-        (self.0.progress)(self.0.evaluations.get(), residual.norm());
+    ) -> Result<(DVector<f64>, DMatrix<f64>), Cancelled> {
+        let (residual, jacobian) = self.0.linearise(scaled)?;
+        let done = self.0.evaluations.get() + 1;
+        self.0.evaluations.set(done);
+        let error = Some(residual.norm());
+        let total = self.1.iterations.max(done);
+        self.0.work.tell_error(Stage::Fitting, done, total, error);
         Ok((residual, jacobian))
     }
 }

@@ -4,40 +4,54 @@ use loopsight_model::model::pseudo_inverse;
 use nalgebra::DVector;
 
 use crate::problem::Problem;
+use crate::progress::Cancelled;
 
 impl Problem<'_> {
     /// Cost at `values`, and the one that a full Gauss–Newton step would reach if the model were linear
     /// in its unknowns.
-    pub(crate) fn promise(&self, values: &[f64], states: &[DVector<f64>]) -> Option<(f64, f64)> {
-        let (residual, jacobian) = self.linearise(&self.pack(values, states));
+    ///
+    /// None where there is no such step.
+    pub(crate) fn promise(
+        &self,
+        values: &[f64],
+        states: &[DVector<f64>],
+    ) -> Result<Option<(f64, f64)>, Cancelled> {
+        let (residual, jacobian) = self.linearise(&self.pack(values, states))?;
         let gram = jacobian.tr_mul(&jacobian);
         let right = jacobian.tr_mul(&residual);
-        let step = pseudo_inverse(&gram)? * &right;
+        let Some(inverse) = pseudo_inverse(&gram) else {
+            return Ok(None);
+        };
+        let step = inverse * &right;
         let before = residual.norm_squared();
         let after = before - right.dot(&step);
-        after.is_finite().then_some((before, after.max(0.0)))
+        Ok(after.is_finite().then_some((before, after.max(0.0))))
     }
 
     /// The values that a full Gauss–Newton step from `values` leads to, those at `fixed` as they are.
+    /// None where there is no such step.
     pub(crate) fn stride(
         &self,
         values: &[f64],
         states: &[DVector<f64>],
         fixed: &[usize],
-    ) -> Option<Vec<f64>> {
+    ) -> Result<Option<Vec<f64>>, Cancelled> {
         let start = self.pack(values, states);
-        let (residual, mut jacobian) = self.linearise(&start);
+        let (residual, mut jacobian) = self.linearise(&start)?;
         for (column, index) in self.free.iter().enumerate() {
             if fixed.contains(index) {
                 jacobian.column_mut(column).fill(0.0);
             }
         }
-        let step = pseudo_inverse(&jacobian.tr_mul(&jacobian))? * jacobian.tr_mul(&residual);
+        let Some(inverse) = pseudo_inverse(&jacobian.tr_mul(&jacobian)) else {
+            return Ok(None);
+        };
+        let step = inverse * jacobian.tr_mul(&residual);
         let (mut values, _) = self.unpack(&(start - step));
         for index in &self.free {
             let declaration = self.model.parameters[*index].declaration;
             values[*index] = declaration.nearest(values[*index]);
         }
-        values.iter().all(|v| v.is_finite()).then_some(values)
+        Ok(values.iter().all(|v| v.is_finite()).then_some(values))
     }
 }

@@ -1,14 +1,16 @@
 //! One candidate at a time: what it promises, a first look, the full fit.
 
 use loopsight_model::model::Model;
+use nalgebra::DVector;
 
 use crate::candidates::Candidate;
-use crate::diagnose::SIGNIFICANT;
+use crate::conclude::SIGNIFICANT;
 use crate::fit::Fit;
 use crate::holdout::{Holdout, Judgement};
 use crate::judge::{Losses, nrmse, significance};
 use crate::positions::Positions;
 use crate::problem::{Problem, Solution};
+use crate::progress::Work;
 use crate::solve::Effort;
 
 /// Effort of a first look at a candidate.
@@ -43,14 +45,16 @@ impl Judged {
         nrmse(&self.rank)
     }
 
-    /// Judges the solution of `model`, a candidate's; none where its free run leaves the finite numbers.
+    /// Judges the solution of `model`, a candidate's; none where its free run leaves the finite numbers,
+    /// or the work was cancelled.
     fn of(
         candidate: Candidate,
         model: &Model,
         solution: Solution,
-        holdout: &Holdout<'_>,
+        nominal: &Nominal<'_>,
     ) -> Option<Self> {
-        let Judgement { losses, rank } = holdout.judge(model, &solution);
+        let Judgement { losses, rank } =
+            (nominal.holdout.judge(model, &solution, nominal.work)).ok()?;
         nrmse(&rank).is_finite().then_some(Self {
             candidate,
             solution,
@@ -83,14 +87,36 @@ const PROMISING: f64 = 0.99;
 /// position is what is measured.
 const TOLD: f64 = 0.1;
 
-/// What a candidate promises to leave of the cost, from one start; the plain model leaves `plain`.
-pub(crate) fn promise(
-    candidate: &Candidate,
-    start: &[f64],
-    holdout: &Holdout<'_>,
-    nominal: &Solution,
-    plain: f64,
-) -> Option<f64> {
+/// The model without any candidate, fitted, and what every candidate is fitted to and judged on.
+pub(crate) struct Nominal<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) solution: &'a Solution,
+    /// What it leaves of the cost.
+    pub(crate) cost: f64,
+    /// What candidates are ranked by.
+    pub(crate) rank: &'a Losses,
+    pub(crate) holdout: &'a Holdout<'a>,
+    /// Tells nobody; stops each trial.
+    pub(crate) work: &'a Work<'a>,
+}
+
+impl<'a> Nominal<'a> {
+    /// The problem of fitting `model` to what may be seen; with initial states that are `held`, or
+    /// estimated. None where the work was cancelled.
+    fn problem<'m>(&self, model: &'m Model, held: Option<&[DVector<f64>]>) -> Option<Problem<'m>>
+    where
+        'a: 'm,
+    {
+        let held = held.map(<[DVector<f64>]>::to_vec);
+        let seen = self.holdout.seen.as_deref();
+        Problem::with(model, self.holdout.runs, seen, held, self.work.silently()).ok()
+    }
+}
+
+/// What a candidate promises to leave of the cost, from one start.
+pub(crate) fn promise(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) -> Option<f64> {
+    nominal.work.go_on().ok()?;
+    let plain = nominal.cost;
     let steps = if Positions::matter_to(candidate.meta) {
         LOOK_STEPS
     } else {
@@ -103,11 +129,10 @@ pub(crate) fn promise(
         model.parameters[*index].free = false;
         model.parameters[*index].value = Some(start[*index]);
     }
-    let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
-    let mut problem =
-        Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {}).ok()?;
+    let states = &nominal.solution.states;
+    let mut problem = nominal.problem(&model, Some(states))?;
     problem.positions = positions(candidate, start);
-    let (before, after) = problem.promise(start, &states)?;
+    let (before, after) = problem.promise(start, states).ok()??;
     match shape {
         // With measured positions also the plain model leaves less than in its free run; where they leave
         // hardly anything, the regression says nothing.
@@ -127,46 +152,41 @@ fn positions(candidate: &Candidate, start: &[f64]) -> Option<Positions> {
 }
 
 /// A quick fit of a candidate from one start, with the nominal initial states.
-pub(crate) fn look(
-    candidate: &Candidate,
-    start: &[f64],
-    holdout: &Holdout<'_>,
-    nominal: &Solution,
-) -> Option<Judged> {
+pub(crate) fn look(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) -> Option<Judged> {
+    nominal.work.go_on().ok()?;
     let model = coarse(candidate, LOOK_STEPS);
-    let (seen, states) = (holdout.seen.as_deref(), nominal.states.clone());
-    let problem = || Problem::with(&model, holdout.runs, seen, Some(states.clone()), &|_, _| {});
+    let states = &nominal.solution.states;
+    let problem = || nominal.problem(&model, Some(states));
     let mut start = start.to_vec();
     if let Some(measured) = positions(candidate, &start) {
-        let mut problem = problem().ok()?;
+        let mut problem = problem()?;
         problem.positions = Some(measured);
         // What is linear in the effect begins where a regression has it: a ripple against the true
         // one makes a machine stick that does not.
         if let Some(shape) = candidate.shape() {
-            start = problem.stride(&start, &states, &shape).unwrap_or(start);
+            let regressed = problem.stride(&start, states, &shape).ok()?;
+            start = regressed.unwrap_or(start);
         }
-        start = problem.solve_from(&start, &states, LOOK).ok()?.values;
+        start = problem.solve_from(&start, states, LOOK).ok()?.values;
     }
-    let solution = problem().ok()?.solve_from(&start, &states, LOOK).ok()?;
-    Judged::of(candidate.clone(), &model, solution, holdout)
+    let solution = problem()?.solve_from(&start, states, LOOK).ok()?;
+    Judged::of(candidate.clone(), &model, solution, nominal)
 }
 
 /// The full fit of a finalist, initial states included, with intervals: where it has a sign, as sharply
 /// as it can be, unless the machine does not stick so; then as softly as it is.
-pub(crate) fn finish(
-    first: Judged,
-    holdout: &Holdout<'_>,
-    nominal: &Solution,
-) -> Option<(Judged, Fit)> {
+///
+/// None where no fit does, or the work was cancelled.
+pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     // The sharpest that can be.
     let sharp = SHARP.iter().find_map(|share| {
         let sharp = Judged {
             candidate: first.candidate.smoothed(*share)?,
             ..first.clone()
         };
-        fully(sharp, holdout, nominal, WILD)
+        fully(sharp, nominal, WILD)
     });
-    let broad = fully(first, holdout, nominal, f64::INFINITY);
+    let broad = fully(first, nominal, f64::INFINITY);
     let error = |found: &(Judged, Fit)| found.0.error();
     let of = |found: &Option<(Judged, Fit)>| found.as_ref().map_or(f64::INFINITY, error);
     // A width is one more thing to be found: it must be there beyond doubt.
@@ -174,9 +194,12 @@ pub(crate) fn finish(
         .as_ref()
         .filter(|_| of(&broad) < of(&sharp))
         .and_then(|(judged, _)| {
-            let soft = softer(judged.clone(), holdout, nominal)?;
-            (significance(&judged.rank, &soft.0.rank) > SIGNIFICANT).then_some(soft)
+            let soft = softer(judged.clone(), nominal)?;
+            let sure = significance(&judged.rank, &soft.0.rank, nominal.work).ok()?;
+            (sure > SIGNIFICANT).then_some(soft)
         });
+    // Of fits that were not all done none is the best.
+    nominal.work.go_on().ok()?;
     sharp
         .into_iter()
         .chain(broad)
@@ -186,13 +209,13 @@ pub(crate) fn finish(
 
 /// Fits also the width over which the sign is smoothed, from where a fit without it ended: what is softer
 /// than usual would else be taken for another effect. None without a sign.
-fn softer(mut first: Judged, holdout: &Holdout<'_>, nominal: &Solution) -> Option<(Judged, Fit)> {
+fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     let widths = first.candidate.own_widths();
     widths.first()?;
     for i in &widths {
         first.candidate.model.parameters[*i].free = true;
     }
-    let (mut judged, mut fit) = fully(first, holdout, nominal, f64::INFINITY)?;
+    let (mut judged, mut fit) = fully(first, nominal, f64::INFINITY)?;
     // From here on they are known, as other widths are.
     for model in [&mut judged.candidate.model, &mut fit.model] {
         for i in &widths {
@@ -212,30 +235,23 @@ const SHARP: [f64; 2] = [0.004, 0.01];
 const WILD: f64 = 1e4;
 
 /// The full fit; none where its derivatives run wild or the effect is none of its own.
-fn fully(
-    first: Judged,
-    holdout: &Holdout<'_>,
-    nominal: &Solution,
-    wild: f64,
-) -> Option<(Judged, Fit)> {
-    let quiet = |_: u64, _: f64| {};
+fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit)> {
     let model = &first.candidate.model;
-    let mut problem =
-        Problem::with(model, holdout.runs, holdout.seen.as_deref(), None, &quiet).ok()?;
-    let start = problem.pack(&first.solution.values, &nominal.states);
-    if problem.steepness(&start) > wild {
+    let mut problem = nominal.problem(model, None)?;
+    let start = problem.pack(&first.solution.values, &nominal.solution.states);
+    if problem.steepness(&start).ok()? > wild {
         return None;
     }
-    let start = problem.balance(start);
+    let start = problem.balance(start).ok()?;
     let found = problem.solve(&start, FINAL).ok()?;
-    if problem.steepness(&found) > wild {
+    if problem.steepness(&found).ok()? > wild {
         return None;
     }
     let solution = problem.solution(&found);
     if first.candidate.drowns(&solution.values) {
         return None;
     }
-    let fit = problem.result(&found);
-    let judged = Judged::of(first.candidate.clone(), model, solution, holdout)?;
+    let fit = problem.result(&found).ok()?;
+    let judged = Judged::of(first.candidate.clone(), model, solution, nominal)?;
     Some((judged, fit))
 }

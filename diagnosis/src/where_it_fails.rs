@@ -2,11 +2,12 @@
 
 use loopsight_model::model::{Model, signals};
 use loopsight_model::run::Run;
-use loopsight_model::simulate::{Simulator, follow};
+use loopsight_model::simulate::{Simulator, try_follow};
 use serde::Serialize;
 
 use crate::motion::{Motion, changes, rest, speed};
 use crate::problem::Solution;
+use crate::progress::{Cancelled, Work};
 
 /// One statement.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -46,9 +47,18 @@ struct Samples {
 }
 
 /// Statements about the free run of the fitted model, the most telling first.
-pub(crate) fn where_it_fails(model: &Model, solution: &Solution, runs: &[Run]) -> Vec<Statement> {
+pub(crate) fn where_it_fails(
+    model: &Model,
+    solution: &Solution,
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<Vec<Statement>, Cancelled> {
     let mut list = Vec::new();
-    for (m, samples) in model.measured.iter().zip(collect(model, solution, runs)) {
+    for (m, samples) in model
+        .measured
+        .iter()
+        .zip(collect(model, solution, runs, work)?)
+    {
         let (name, unit) = (m.signal.id, m.signal.unit);
         let motion = Motion::of(unit);
         let found = [
@@ -73,11 +83,16 @@ pub(crate) fn where_it_fails(model: &Model, solution: &Solution, runs: &[Run]) -
             .total_cmp(&a.share_of_squared_error)
     });
     list.truncate(MOST);
-    list
+    Ok(list)
 }
 
 /// The samples of each measured signal.
-fn collect(model: &Model, solution: &Solution, runs: &[Run]) -> Vec<Samples> {
+fn collect(
+    model: &Model,
+    solution: &Solution,
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<Vec<Samples>, Cancelled> {
     let n = model.measured.len();
     let mut all: Vec<Samples> = (0..n)
         .map(|_| Samples {
@@ -107,7 +122,7 @@ fn collect(model: &Model, solution: &Solution, runs: &[Run]) -> Vec<Samples> {
             .map(|(samples, of_signal)| changes(&of_signal[index], samples.rest))
             .collect();
         let mut simulator = Simulator::new(model, &solution.values);
-        follow(&mut simulator, x0.as_slice(), run, |k, predicted, now| {
+        try_follow(&mut simulator, x0.as_slice(), run, |k, predicted, now| {
             for (i, samples) in all.iter_mut().enumerate() {
                 let error = run.sample(k)[i] - predicted[i];
                 if !error.is_finite() {
@@ -127,9 +142,10 @@ fn collect(model: &Model, solution: &Solution, runs: &[Run]) -> Vec<Samples> {
                     list.push(*value);
                 }
             }
-        });
+            work.go_on()
+        })?;
     }
-    all
+    Ok(all)
 }
 
 /// A statement, and the share of the squared error it speaks of.

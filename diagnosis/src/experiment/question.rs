@@ -8,6 +8,7 @@ use loopsight_model::registry::{self, BuildError};
 use crate::Place;
 use crate::candidates::{channel_sets, suit};
 use crate::experiment::Limits;
+use crate::progress::Cancelled;
 
 /// Why a question cannot be answered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -103,6 +104,9 @@ pub enum QuestionError {
     /// An excitation could not be built.
     #[error(transparent)]
     Excitation(#[from] BuildError),
+    /// The work was cancelled.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 fn hint(near: Option<&str>, otherwise: &str) -> String {

@@ -7,7 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::experiment::Drive;
 use crate::noise::Arma;
-use crate::prediction::{predict, residuals, sensitivities};
+use crate::prediction::{By, predict, residuals, sensitivities};
+use crate::progress::{Cancelled, Work};
 
 /// What separates two models under one drive, in units of the sensors' noise.
 #[derive(Clone, Debug)]
@@ -33,7 +34,12 @@ impl Distance {
 }
 
 /// The noise-free response of `model` to `drive`, from rest.
-pub(crate) fn response(model: &Model, values: &[f64], drive: &Drive) -> Run {
+pub(crate) fn response(
+    model: &Model,
+    values: &[f64],
+    drive: &Drive,
+    work: &Work<'_>,
+) -> Result<Run, Cancelled> {
     let mut run = Run {
         time: drive.time.clone(),
         inputs: drive.inputs.clone(),
@@ -41,8 +47,8 @@ pub(crate) fn response(model: &Model, values: &[f64], drive: &Drive) -> Run {
         n_measured: model.measured.len(),
         ..Run::default()
     };
-    run.measured = predict(model, values, &vec![0.0; model.n_states()], &run);
-    run
+    run.measured = predict(model, values, &vec![0.0; model.n_states()], &run, work)?;
+    Ok(run)
 }
 
 /// Fits the free parameters of `model` to `truth` from `start` by Gauss–Newton (steps halved until
@@ -57,16 +63,21 @@ pub(crate) fn rival(
     truth: &Run,
     noise: &[f64],
     iterations: usize,
-) -> Distance {
+    work: &Work<'_>,
+) -> Result<Distance, Cancelled> {
     let free: Vec<usize> = (0..model.parameters.len())
         .filter(|i| model.parameters[*i].free)
         .collect();
     let x0 = vec![0.0; model.n_states()];
     let weighted = |predicted: &[f64]| weigh(residuals(predicted, truth), noise);
     let mut values = start.to_vec();
-    let mut left = weighted(&predict(model, &values, &x0, truth));
+    let mut left = weighted(&predict(model, &values, &x0, truth, work)?);
+    let by = By {
+        parameters: &free,
+        states: &[],
+    };
     for _ in 0..iterations {
-        let s = sensitivities(model, &values, &x0, truth, &free, &[]);
+        let s = sensitivities(model, &values, &x0, truth, by, work)?;
         let jacobian = scaled(model, &free, s.jacobian, noise);
         let gram = jacobian.tr_mul(&jacobian);
         let Some(inverse) = pseudo_inverse(&gram) else {
@@ -83,7 +94,7 @@ pub(crate) fn rival(
                 let change = share * step[k] * parameter.scale();
                 tried[*i] = parameter.declaration.nearest(values[*i] + change);
             }
-            let after = weighted(&predict(model, &tried, &x0, truth));
+            let after = weighted(&predict(model, &tried, &x0, truth, work)?);
             if after.norm_squared() < before {
                 values = tried;
                 left = after;
@@ -95,7 +106,7 @@ pub(crate) fn rival(
             break;
         }
     }
-    Distance::of(&left, noise.len())
+    Ok(Distance::of(&left, noise.len()))
 }
 
 /// What a recording says about parameters, in units of their scales and of the noise.
@@ -116,10 +127,15 @@ pub(crate) fn information(
     drive: &Drive,
     free: &[usize],
     noise: &[f64],
-) -> Information {
-    let run = response(model, values, drive);
+    work: &Work<'_>,
+) -> Result<Information, Cancelled> {
+    let run = response(model, values, drive, work)?;
     let x0 = vec![0.0; model.n_states()];
-    let s = sensitivities(model, values, &x0, &run, free, &[]);
+    let by = By {
+        parameters: free,
+        states: &[],
+    };
+    let s = sensitivities(model, values, &x0, &run, by, work)?;
     let jacobian = scaled(model, free, s.jacobian, noise);
     let mut coloured = jacobian.clone();
     let n = noise.len();
@@ -134,10 +150,10 @@ pub(crate) fn information(
             }
         }
     }
-    Information {
+    Ok(Information {
         gram: jacobian.tr_mul(&jacobian),
         meat: coloured.tr_mul(&coloured),
-    }
+    })
 }
 
 /// Differenced rounding of unit variance.

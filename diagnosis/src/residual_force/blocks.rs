@@ -4,6 +4,7 @@ use loopsight_model::run::Run;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::response::Responses;
+use crate::progress::{Cancelled, Work};
 
 /// Shortest and longest block, s.
 const BLOCK: (f64, f64) = (0.4, 2.5);
@@ -44,7 +45,12 @@ fn blocks(runs: &[Run]) -> (Vec<usize>, usize) {
 impl Blocks {
     /// Columns of the same meaning, or of no sample where a fit may look, stay near zero: `ridge` is
     /// the weight of that, as a share of each column's own square.
-    pub(super) fn new(responses: &Responses, runs: &[Run], ridge: f64) -> Self {
+    pub(super) fn new(
+        responses: &Responses,
+        runs: &[Run],
+        ridge: f64,
+        work: &Work<'_>,
+    ) -> Result<Self, Cancelled> {
         let (block, n) = blocks(runs);
         let per_sample = if block.is_empty() {
             1
@@ -60,6 +66,7 @@ impl Blocks {
         };
         let mut from = 0;
         for part in block.chunk_by(|a, b| a == b) {
+            work.go_on()?;
             let rows = part.len() * per_sample;
             let x = responses.columns.rows(from, rows);
             let y = responses.innovations.rows(from, rows);
@@ -69,7 +76,7 @@ impl Blocks {
             blocks.square.push(y.norm_squared());
             from += rows;
         }
-        blocks
+        Ok(blocks)
     }
 
     /// Sum of squares of what is to be explained.

@@ -13,6 +13,7 @@ use super::place::{Group, Law};
 use super::response::{Column, Responses, responses};
 use super::shape::Variable;
 use crate::problem::Solution;
+use crate::progress::{Cancelled, Work};
 
 /// Bins of a quantity.
 const BINS: usize = 16;
@@ -90,12 +91,13 @@ pub(super) fn dependences(
     group: &Group,
     at: &[usize],
     laws: &[Law],
-) -> Vec<Dependence> {
+    work: &Work<'_>,
+) -> Result<Vec<Dependence>, Cancelled> {
     let mut all: Vec<Dependence> = (0..group.quantities.len())
-        .filter_map(|q| dependence(held, group, at, laws, q))
-        .collect();
+        .filter_map(|q| dependence(held, group, at, laws, q, work).transpose())
+        .collect::<Result<_, Cancelled>>()?;
     all.sort_by(|a, b| b.share_of_variance.total_cmp(&a.share_of_variance));
-    all
+    Ok(all)
 }
 
 fn dependence(
@@ -104,7 +106,8 @@ fn dependence(
     at: &[usize],
     laws: &[Law],
     quantity: usize,
-) -> Option<Dependence> {
+    work: &Work<'_>,
+) -> Result<Option<Dependence>, Cancelled> {
     let of = &group.quantities[quantity];
     let flow = group
         .quantities
@@ -120,7 +123,9 @@ fn dependence(
     for (_, sign) in directions {
         let goes =
             |c: usize, k: usize| flow.is_none_or(|flow| group.series[c][flow][k] * sign > 0.0);
-        let part = sort(group, at, quantity, &goes)?;
+        let Some(part) = sort(group, at, quantity, &goes) else {
+            return Ok(None);
+        };
         for bin in 0..part.center.len() {
             let forces = at
                 .iter()
@@ -140,7 +145,8 @@ fn dependence(
         held.runs,
         held.filtered,
         &columns,
-    );
+        work,
+    )?;
     let blocks = Blocks::new(
         &Responses {
             innovations: held.innovations.clone(),
@@ -148,9 +154,12 @@ fn dependence(
         },
         held.runs,
         RIDGE,
-    );
+        work,
+    )?;
     let every: Vec<usize> = (0..columns.len()).collect();
-    let means = blocks.solve(&every)?;
+    let Some(means) = blocks.solve(&every) else {
+        return Ok(None);
+    };
     let left: f64 = blocks.unseen(&every).iter().sum();
     let share = (blocks.total() - left) / (blocks.total() - held.noise);
     let mut means = means.into_iter();
@@ -174,13 +183,13 @@ fn dependence(
         })
         .filter(|curve| !curve.bins.is_empty())
         .collect();
-    Some(Dependence {
+    Ok(Some(Dependence {
         quantity: of.variable.name().to_owned(),
         unit: of.unit.clone(),
         period: of.turns.then_some(TAU),
         share_of_variance: share.clamp(0.0, 1.0),
         curves,
-    })
+    }))
 }
 
 /// Sorts the samples of the channels `at` into bins of equal width; `None` where all are alike.

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use crate::floor::noise;
 use crate::problem::Solution;
+use crate::progress::{Cancelled, Work};
 
 /// Sizes of the unknown force that are tried, in the size of the channels.
 const SIZES: [f64; 6] = [0.02, 0.1, 0.4, 1.2, 3.5, 10.0];
@@ -62,23 +63,26 @@ impl Filtered {
 /// Reference: A. H. Jazwinski (1970), "Stochastic Processes and Filtering Theory", section 8.3;
 /// the likelihood is that of the innovations, F. C. Schweppe (1965), IEEE Trans. Information Theory
 /// 11, 61–70.
-pub(super) fn filter(model: &Model, solution: &Solution, runs: &[Run]) -> Vec<Filtered> {
+pub(super) fn filter(
+    model: &Model,
+    solution: &Solution,
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<Vec<Filtered>, Cancelled> {
     let tried: Vec<Vec<Filtered>> = SIZES
         .par_iter()
         .map(|size| {
             runs.iter()
                 .zip(&solution.states)
-                .map(|(run, x0)| filtered(model, &solution.values, run, x0, *size))
+                .map(|(run, x0)| filtered(model, &solution.values, run, x0, *size, work))
                 .collect()
         })
-        .collect();
-    tried
-        .into_iter()
-        .max_by(|a, b| {
-            let sum = |of: &Vec<Filtered>| of.iter().map(|f| f.likelihood).sum::<f64>();
-            sum(a).total_cmp(&sum(b))
-        })
-        .unwrap_or_default()
+        .collect::<Result<_, Cancelled>>()?;
+    let best = tried.into_iter().max_by(|a, b| {
+        let sum = |of: &Vec<Filtered>| of.iter().map(|f| f.likelihood).sum::<f64>();
+        sum(a).total_cmp(&sum(b))
+    });
+    Ok(best.unwrap_or_default())
 }
 
 /// Places of the unknown force, with their sizes.
@@ -193,7 +197,14 @@ pub(super) fn innovation<S: Real>(sample: &[f64], predicted: &[S], rounded: &[S]
     }
 }
 
-fn filtered(model: &Model, values: &[f64], run: &Run, x0: &DVector<f64>, size: f64) -> Filtered {
+fn filtered(
+    model: &Model,
+    values: &[f64],
+    run: &Run,
+    x0: &DVector<f64>,
+    size: f64,
+    work: &Work<'_>,
+) -> Result<Filtered, Cancelled> {
     let (nx, ny, n_signals) = (model.n_states(), model.measured.len(), model.n_signals());
     let mut out = Filtered {
         gains: Vec::new(),
@@ -204,7 +215,7 @@ fn filtered(model: &Model, values: &[f64], run: &Run, x0: &DVector<f64>, size: f
         likelihood: 0.0,
     };
     if run.is_empty() {
-        return out;
+        return Ok(out);
     }
     let mut bare = model.clone();
     bare.effects.clear();
@@ -242,6 +253,7 @@ fn filtered(model: &Model, values: &[f64], run: &Run, x0: &DVector<f64>, size: f
     let mut rounded = vec![0.0; ny];
     let mut beyond = DVector::zeros(ny);
     for k in 1..run.len() {
+        work.go_on()?;
         let until = run.time[k] - run.time[0];
         let before: Vec<f64> = simulator.signals().to_vec();
         let ab = linear.step(simulator.state(), until, run.input(k - 1));
@@ -310,5 +322,5 @@ fn filtered(model: &Model, values: &[f64], run: &Run, x0: &DVector<f64>, size: f
     for _ in out.gains.len()..run.len() {
         out.pass(nx, ny, vec![0.0; n_signals]);
     }
-    out
+    Ok(out)
 }

@@ -19,6 +19,7 @@ pub use dependence::{Bin, Curve, Dependence};
 
 use crate::prediction::InitialStates;
 use crate::problem::Solution;
+use crate::progress::{Cancelled, Work};
 use blocks::Blocks;
 use dependence::{Held, dependences};
 use filter::filter;
@@ -76,10 +77,18 @@ pub struct Expression {
 /// coefficient was found from, so that chance gives nothing.
 ///
 /// `None` where the plant offers no place for a force, or noise explains what there is.
-pub fn residual_force(model: &Model, runs: &[Run]) -> Option<ResidualForce> {
+///
+/// # Errors
+///
+/// [`Cancelled`] when the work was cancelled.
+pub fn residual_force(
+    model: &Model,
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<Option<ResidualForce>, Cancelled> {
     let values = model.values();
-    let states = InitialStates::estimate(model, &values, runs).states;
-    of_solution(model, &Solution { values, states }, runs)
+    let states = InitialStates::estimate(model, &values, runs, work)?.states;
+    of_solution(model, &Solution { values, states }, runs, work)
 }
 
 /// As [`residual_force`], from known initial states.
@@ -87,30 +96,32 @@ pub(crate) fn of_solution(
     model: &Model,
     solution: &Solution,
     runs: &[Run],
-) -> Option<ResidualForce> {
+    work: &Work<'_>,
+) -> Result<Option<ResidualForce>, Cancelled> {
     let runs = &shortened(runs);
-    let filtered = filter(model, solution, runs);
+    let filtered = filter(model, solution, runs, work)?;
     let noise: f64 = filtered.iter().map(|f| f.noise).sum();
     let parameters: Vec<usize> = (0..model.parameters.len())
         .filter(|i| model.parameters[*i].free)
         .collect();
     let known: Vec<usize> = (0..parameters.len()).collect();
     let bend: Vec<Column> = parameters.iter().map(|i| Column::Parameter(*i)).collect();
-    let bent = responses(model, solution, runs, &filtered, &bend);
+    let bent = responses(model, solution, runs, &filtered, &bend, work)?;
 
     let spread = noise * (2.0 / bent.innovations.len().max(1) as f64).sqrt();
-    let plain: f64 = Blocks::new(&bent, runs, RIDGE).unseen(&known).iter().sum();
+    let blocks = Blocks::new(&bent, runs, RIDGE, work)?;
+    let plain: f64 = blocks.unseen(&known).iter().sum();
     if plain - noise < SEEN * spread {
-        return None;
+        return Ok(None);
     }
 
     let mut best: Option<Found> = None;
     for group in groups(model, runs, &filtered) {
-        let forces = responses(model, solution, runs, &filtered, &group.columns());
-        let blocks = Blocks::new(&group.joined(&bent, &forces), runs, RIDGE);
+        let forces = responses(model, solution, runs, &filtered, &group.columns(), work)?;
+        let blocks = Blocks::new(&group.joined(&bent, &forces), runs, RIDGE, work)?;
         for way in group.ways.clone() {
             let choices = group.choices(way, known.len());
-            let chosen = select(&blocks, &known, &choices, noise);
+            let chosen = select(&blocks, &known, &choices, noise, work)?;
             let better = best.as_ref().is_none_or(|best| {
                 let other = &best.chosen;
                 if chosen.complexity < other.complexity {
@@ -124,7 +135,9 @@ pub(crate) fn of_solution(
             }
             let of_terms = chosen.terms.iter().flat_map(|t| &choices[*t].columns);
             let columns: Vec<usize> = known.iter().chain(of_terms).copied().collect();
-            let numbers = sure(&blocks, known.len(), columns.clone())?;
+            let Some(numbers) = sure(&blocks, known.len(), columns.clone()) else {
+                return Ok(None);
+            };
             best = Some(Found {
                 left: blocks.unseen(&columns).iter().sum(),
                 group: group.clone(),
@@ -134,7 +147,7 @@ pub(crate) fn of_solution(
             });
         }
     }
-    let found = best?;
+    let Some(found) = best else { return Ok(None) };
     let (bending, numbers) = found.numbers.split_at(known.len());
     // The force that is missing is the one that the known part leaves when it is at its best.
     let mut innovations = bent.innovations.clone();
@@ -155,7 +168,7 @@ pub(crate) fn of_solution(
         innovations: &innovations,
         noise,
     };
-    let depends_on = dependences(&held, &found.group, &at, &laws);
+    let depends_on = dependences(&held, &found.group, &at, &laws, work)?;
     let share = (1.0 - (found.left - noise) / explainable).clamp(0.0, 1.0);
     // A force that does not vary has no variance to account for.
     let share = if share.is_nan() { 0.0 } else { share };
@@ -171,7 +184,7 @@ pub(crate) fn of_solution(
             toml,
         }
     });
-    Some(ResidualForce {
+    Ok(Some(ResidualForce {
         statement: statement(
             &names,
             &depends_on,
@@ -181,7 +194,7 @@ pub(crate) fn of_solution(
         at: names,
         depends_on,
         expression,
-    })
+    }))
 }
 
 /// The coefficients of `columns`; zero for what is no more than noise, as one half of a wave may be,

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::filter::{Filtered, innovation};
 use crate::problem::Solution;
+use crate::progress::{Cancelled, Work};
 
 /// Something that could be different, by one unit.
 #[derive(Clone, Debug)]
@@ -36,7 +37,8 @@ pub(super) fn responses(
     runs: &[Run],
     filtered: &[Filtered],
     columns: &[Column],
-) -> Responses {
+    work: &Work<'_>,
+) -> Result<Responses, Cancelled> {
     let ny = model.measured.len();
     let rows = runs.iter().map(Run::len).sum::<usize>() * ny;
     let innovations = DVector::from_iterator(
@@ -45,17 +47,17 @@ pub(super) fn responses(
     );
     let batches: Vec<DMatrix<f64>> = columns
         .par_chunks(DUAL_WIDTH)
-        .map(|batch| batch_of(model, solution, runs, filtered, batch, rows))
-        .collect();
+        .map(|batch| batch_of(model, solution, runs, filtered, batch, work))
+        .collect::<Result<_, Cancelled>>()?;
     let mut all = DMatrix::zeros(rows, columns.len());
     for (k, batch) in batches.iter().enumerate() {
         all.columns_mut(k * DUAL_WIDTH, batch.ncols())
             .copy_from(batch);
     }
-    Responses {
+    Ok(Responses {
         innovations,
         columns: all,
-    }
+    })
 }
 
 fn batch_of(
@@ -64,8 +66,10 @@ fn batch_of(
     runs: &[Run],
     filtered: &[Filtered],
     batch: &[Column],
-    rows: usize,
-) -> DMatrix<f64> {
+    work: &Work<'_>,
+) -> Result<DMatrix<f64>, Cancelled> {
+    let ny = model.measured.len();
+    let rows = runs.iter().map(Run::len).sum::<usize>() * ny;
     let mut out = DMatrix::zeros(rows, batch.len());
     let values: Vec<Dual> = solution
         .values
@@ -84,7 +88,6 @@ fn batch_of(
             places.push(*place);
         }
     }
-    let ny = model.measured.len();
     let mut outputs = vec![Dual::of(0.0); ny];
     let mut beyond = vec![Dual::of(0.0); ny];
     let mut first = 0;
@@ -96,6 +99,7 @@ fn batch_of(
             simulator.reset(&x0, run.input(0));
         }
         for k in 1..run.len() {
+            work.go_on()?;
             for place in &places {
                 let mut push = Dual::of(0.0);
                 for (c, column) in batch.iter().enumerate() {
@@ -135,7 +139,7 @@ fn batch_of(
         }
         first += run.len();
     }
-    out
+    Ok(out)
 }
 
 fn forces(column: &Column) -> &[(Place, Vec<f64>)] {

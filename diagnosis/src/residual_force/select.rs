@@ -1,6 +1,7 @@
 //! A few terms that explain a force, chosen one after the other.
 
 use super::blocks::{Blocks, gain};
+use crate::progress::{Cancelled, Work};
 
 /// A term must be so many standard errors better on blocks that it was not fitted to: there are
 /// hundreds to choose from.
@@ -35,7 +36,13 @@ pub(super) struct Chosen {
 
 /// Chooses terms for as long as one more pays on unseen blocks, then drops those that later ones
 /// made needless. The columns `known` may always bend: they are the model's own parameters.
-pub(super) fn select(blocks: &Blocks, known: &[usize], choices: &[Choice], noise: f64) -> Chosen {
+pub(super) fn select(
+    blocks: &Blocks,
+    known: &[usize],
+    choices: &[Choice],
+    noise: f64,
+    work: &Work<'_>,
+) -> Result<Chosen, Cancelled> {
     let columns = |terms: &[usize]| -> Vec<usize> {
         let chosen = terms
             .iter()
@@ -49,15 +56,16 @@ pub(super) fn select(blocks: &Blocks, known: &[usize], choices: &[Choice], noise
     let mut terms: Vec<usize> = Vec::new();
     let mut losses = plain.clone();
     while terms.len() < MOST {
-        let tried: Vec<(usize, f64, f64)> = (0..choices.len())
+        let mut tried: Vec<(usize, f64, f64)> = (0..choices.len())
             .filter(|t| !terms.contains(t))
             .map(|t| {
+                work.go_on()?;
                 let with: Vec<usize> = terms.iter().copied().chain([t]).collect();
                 let (sum, errors) = gain(&losses, &blocks.unseen(&columns(&with)));
-                (t, sum, errors)
+                Ok((t, sum, errors))
             })
-            .filter(|(_, sum, errors)| *sum > worth && *errors > CERTAIN)
-            .collect();
+            .collect::<Result<_, Cancelled>>()?;
+        tried.retain(|(_, sum, errors)| *sum > worth && *errors > CERTAIN);
         let best = tried.iter().map(|t| t.1).fold(0.0, f64::max);
         let simplest = tried
             .iter()
@@ -82,9 +90,9 @@ pub(super) fn select(blocks: &Blocks, known: &[usize], choices: &[Choice], noise
             losses = fewer;
         }
     }
-    Chosen {
+    Ok(Chosen {
         explained: base - losses.iter().sum::<f64>(),
         complexity: terms.iter().map(|t| choices[*t].complexity).sum(),
         terms,
-    }
+    })
 }

@@ -1,5 +1,7 @@
 //! A model in motion over a recorded run.
 
+use std::convert::Infallible;
+
 use crate::registry::HostReal;
 use crate::run::Run;
 
@@ -26,8 +28,25 @@ pub fn follow<'m, S: HostReal>(
     run: &Run,
     mut each: impl FnMut(usize, &[S], &mut Simulator<'m, S>),
 ) {
+    let _: Result<(), Infallible> = try_follow(simulator, x0, run, |k, predicted, now| {
+        each(k, predicted, now);
+        Ok(())
+    });
+}
+
+/// As [`follow`]; an error that `each` returns ends the simulation.
+///
+/// # Errors
+///
+/// That of `each`.
+pub fn try_follow<'m, S: HostReal, E>(
+    simulator: &mut Simulator<'m, S>,
+    x0: &[S],
+    run: &Run,
+    mut each: impl FnMut(usize, &[S], &mut Simulator<'m, S>) -> Result<(), E>,
+) -> Result<(), E> {
     let Some(&start) = run.time.first() else {
-        return;
+        return Ok(());
     };
     let mut predicted = vec![S::zero(); simulator.model.measured.len()];
     simulator.reset(x0, run.input(0));
@@ -36,9 +55,10 @@ pub fn follow<'m, S: HostReal>(
             simulator.advance_between(run.time[k] - start, run.input(k - 1), run.input(k));
         }
         simulator.measure(&mut predicted);
-        each(k, &predicted, simulator);
+        each(k, &predicted, simulator)?;
         if let Some(observer) = run.observer.as_deref() {
             simulator.correct(observer, k, run.sample(k), &predicted);
         }
     }
+    Ok(())
 }

@@ -18,7 +18,7 @@ use crate::run::Hold;
 use loopsight_core::{NoPast, Place, Rk4, substeps};
 
 use bound::{Bounds, Scene};
-pub use follow::{follow, free_run};
+pub use follow::{follow, free_run, try_follow};
 use history::{Between, History};
 pub use observer::StateObserver;
 use push::Pushed;

@@ -1,0 +1,108 @@
+//! Why work fails.
+
+use loopsight_model::regression::RegressionError;
+
+use crate::progress::Cancelled;
+
+/// Why a model cannot be compared with measurements.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum CompareError {
+    /// Parameters have no value.
+    #[error("the model gives no value for {}: fit it first, or write the values into the file", .0.join(", "))]
+    MissingValues(Vec<String>),
+    /// Nothing is measured.
+    #[error("the model's log has no measured signal")]
+    NothingMeasured,
+    /// There is no sample.
+    #[error("the recording has no sample")]
+    NoSamples,
+    /// The simulation left the finite numbers.
+    #[error(
+        "the free run{} diverges after {time:.3} s: the model is unstable with these parameters",
+        of_run(run)
+    )]
+    Diverged {
+        /// The run.
+        run: String,
+        /// When, s.
+        time: f64,
+    },
+    /// The work was cancelled.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// ` of <run>` where the run has a name.
+fn of_run(name: &str) -> String {
+    if name.is_empty() {
+        String::new()
+    } else {
+        format!(" of `{name}`")
+    }
+}
+
+/// Why a fit failed.
+#[derive(Debug, thiserror::Error)]
+pub enum FitError {
+    /// See [`CompareError`].
+    #[error(transparent)]
+    Compare(CompareError),
+    /// Nothing to estimate.
+    #[error("no parameter of the model is free: name some under `free` in [fit]")]
+    NothingFree,
+    /// Fewer samples than parameters.
+    #[error("{samples} samples cannot determine {parameters} parameters")]
+    TooFewSamples {
+        /// Usable samples.
+        samples: usize,
+        /// Free parameters.
+        parameters: usize,
+    },
+    /// Known parameters without a value.
+    #[error("the model gives no value for {}, and a fit does not estimate it: write it into the file, or name it under `free` in [fit]", .0.join(", "))]
+    Unknown(Vec<String>),
+    /// A parameter that the regression cannot estimate.
+    #[error(
+        "`{parameter}` enters the equations non-linearly: recursive least squares cannot estimate it; use --method output-error, or name it under `fixed` in [fit]"
+    )]
+    NotLinear {
+        /// Its name.
+        parameter: String,
+    },
+    /// The plant offers no regression.
+    #[error(
+        "the plant `{0}` declares no controlled states, so there is no regression for recursive least squares; use --method output-error"
+    )]
+    NoRegression(String),
+    /// The solver gave up.
+    #[error("the solver gave up: {0}")]
+    Solver(String),
+    /// The estimator's table is wrong.
+    #[error(transparent)]
+    Build(#[from] loopsight_model::registry::BuildError),
+    /// The estimator is not linked.
+    #[error("no estimator `{0}` is linked into this program")]
+    NoEstimator(String),
+    /// The work was cancelled.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl From<CompareError> for FitError {
+    fn from(error: CompareError) -> Self {
+        match error {
+            CompareError::Cancelled(cancelled) => FitError::Cancelled(cancelled),
+            other => FitError::Compare(other),
+        }
+    }
+}
+
+impl From<RegressionError> for FitError {
+    fn from(error: RegressionError) -> Self {
+        match error {
+            RegressionError::NoControlledStates(plant) => FitError::NoRegression(plant),
+            RegressionError::NotLinear(parameter) => FitError::NotLinear { parameter },
+            RegressionError::Unknown(parameter) => FitError::Unknown(vec![parameter]),
+        }
+    }
+}

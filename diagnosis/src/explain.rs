@@ -1,0 +1,97 @@
+//! What is reported of a candidate.
+
+use std::collections::BTreeMap;
+
+use crate::candidates::Candidate;
+use crate::conclusion::{Explanation, Place};
+use crate::fit::{Estimate, Fit, Method, Verdict};
+use crate::judge::{nrmse, significance};
+use crate::progress::Cancelled;
+use crate::trial::{Judged, Nominal};
+
+/// Most standard errors that are reported.
+const MOST: f64 = 1e6;
+
+/// A candidate that was fitted to the end.
+pub(crate) fn explain(
+    judged: &Judged,
+    fit: &Fit,
+    nominal: &Nominal<'_>,
+) -> Result<Explanation, Cancelled> {
+    let candidate = &judged.candidate;
+    let significance = significance(nominal.rank, &judged.rank, nominal.work)?;
+    let holdout = nominal.holdout;
+    let fitted = holdout.fitted(&candidate.model, &judged.solution, nominal.work)?;
+    Ok(Explanation {
+        place: place(candidate),
+        nrmse: nrmse(&judged.losses),
+        parameters: parameters(candidate, &fit.parameters),
+        significance: significance.min(MOST),
+        indistinguishable_from: Vec::new(),
+        note: note(fit, candidate),
+        model: fit.model.clone(),
+        nrmse_fit: nrmse(&fitted),
+    })
+}
+
+/// A candidate that was only looked at, when the work was cancelled.
+pub(crate) fn explain_look(judged: &Judged) -> Explanation {
+    let candidate = &judged.candidate;
+    let mut model = candidate.model.clone();
+    model.set_values(&judged.solution.values);
+    let fit = Fit::cancelled(model, Method::OutputError, f64::NAN, 0);
+    Explanation {
+        place: place(candidate),
+        nrmse: nrmse(&judged.losses),
+        parameters: parameters(candidate, &fit.parameters),
+        significance: f64::NAN,
+        indistinguishable_from: Vec::new(),
+        note: note(&fit, candidate),
+        model: fit.model,
+        nrmse_fit: f64::NAN,
+    }
+}
+
+/// The effect of a candidate, and where.
+fn place(candidate: &Candidate) -> Place {
+    Place {
+        effect: candidate.meta.id.to_owned(),
+        at: candidate.at.iter().map(|c| (*c).to_owned()).collect(),
+    }
+}
+
+/// The candidate's own of the parameters that were fitted.
+fn parameters(
+    candidate: &Candidate,
+    fitted: &BTreeMap<String, Estimate>,
+) -> BTreeMap<String, Estimate> {
+    let mut own = BTreeMap::new();
+    for i in candidate.own() {
+        let parameter = &candidate.model.parameters[i];
+        let Some(estimate) = fitted.get(&parameter.name) else {
+            continue;
+        };
+        // What was tried counts as found: a number of teeth is not fitted but chosen.
+        if parameter.free || !parameter.declaration.starts.is_empty() {
+            own.insert(candidate.name(i), estimate.clone());
+        }
+    }
+    own
+}
+
+/// What to know about a fitted explanation.
+fn note(fit: &Fit, candidate: &Candidate) -> String {
+    let mut words = vec![candidate.meta.symptom.to_owned()];
+    if let Some((simpler, _)) = &candidate.replaces {
+        words.push(format!("in place of {simpler}, which it contains"));
+    }
+    for (name, estimate) in &fit.parameters {
+        if matches!(
+            estimate.verdict,
+            Verdict::AtBound | Verdict::Flat | Verdict::NotPinned
+        ) {
+            words.push(format!("{name}: {}", estimate.verdict.text()));
+        }
+    }
+    words.join("; ")
+}

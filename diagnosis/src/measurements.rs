@@ -1,0 +1,45 @@
+//! What a model is compared with, fitted to and judged on.
+
+use loopsight_model::run::Run;
+use loopsight_recordings::Fault;
+
+/// Measured runs: those to fit to, those to judge on, and what is wrong with the log.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Measurements<'a> {
+    /// The runs that parameters are fitted to.
+    pub runs: &'a [Run],
+    /// Other runs that the fitted model is judged on (validation); `None`: parts of `runs` that the
+    /// fits leave out.
+    pub test: Option<&'a [Run]>,
+    /// Faults that were found in the log.
+    pub faults: &'a [Fault],
+}
+
+impl<'a> Measurements<'a> {
+    /// Runs without a fault; parts of them are left out of the fits to judge on.
+    pub fn new(runs: &'a [Run]) -> Self {
+        Self {
+            runs,
+            ..Self::default()
+        }
+    }
+
+    /// The same, judged on other runs where there are any.
+    #[must_use]
+    pub fn tested_on(mut self, test: Option<&'a [Run]>) -> Self {
+        self.test = test;
+        self
+    }
+
+    /// The same, with what is wrong with the log.
+    #[must_use]
+    pub fn with_faults(mut self, faults: &'a [Fault]) -> Self {
+        self.faults = faults;
+        self
+    }
+
+    /// The runs that judge where there are any, else those to fit to.
+    pub(crate) fn judging(&self) -> &'a [Run] {
+        self.test.unwrap_or(self.runs)
+    }
+}

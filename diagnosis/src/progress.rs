@@ -1,0 +1,191 @@
+//! How far long work is, and how to stop it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::Serialize;
+
+/// What long work is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Stage {
+    /// Simulating the model over the measurements.
+    Comparing,
+    /// Fitting the model as it is.
+    Fitting,
+    /// Asking of every candidate what one Gauss–Newton step promises.
+    Promises,
+    /// Fitting the most promising candidates with a few iterations.
+    FirstLooks,
+    /// Fitting the best candidates to the end.
+    Finalists,
+    /// Looking for the force that no effect of the library explains.
+    ResidualForce,
+    /// Simplifying the improved model, and fitting it again.
+    Refining,
+    /// Trying experiments in simulation.
+    Experiments,
+}
+
+impl Stage {
+    /// In words, as on a progress bar.
+    pub fn text(self) -> &'static str {
+        match self {
+            Stage::Comparing => "comparing",
+            Stage::Fitting => "fitting the model",
+            Stage::Promises => "ranking candidates",
+            Stage::FirstLooks => "trying candidates",
+            Stage::Finalists => "fitting the best",
+            Stage::ResidualForce => "looking for a residual force",
+            Stage::Refining => "refining the model",
+            Stage::Experiments => "trying experiments",
+        }
+    }
+}
+
+/// How far long work is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Progress {
+    /// Round of an [`improve`](crate::improve()), from 0; 0 in any other work.
+    pub round: usize,
+    /// What is being done.
+    pub stage: Stage,
+    /// How much of the stage is done: candidates, iterations, samples, runs.
+    pub done: u64,
+    /// How much there is to be done in the stage. It may grow while the stage runs, and the stage may
+    /// end before: a fit counts up to its greatest number of iterations.
+    pub total: u64,
+    /// The present error of a fit: that of the free run, relative to the standard deviation.
+    pub error: Option<f64>,
+}
+
+/// Stops long work. Clones stop the same work.
+///
+/// A token stays cancelled: give each piece of work a new one.
+#[derive(Clone, Debug, Default)]
+pub struct CancelToken(Arc<AtomicBool>);
+
+impl CancelToken {
+    /// A token that was not cancelled yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Asks the work to stop. It does so within a few samples of a simulation, and returns what it has
+    /// found until then.
+    pub fn cancel(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether it was asked to.
+    pub fn is_cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Work was cancelled before it had anything to return.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cancelled before there was a result")]
+pub struct Cancelled;
+
+type Report<'a> = &'a (dyn Fn(&Progress) + Sync);
+
+/// Long work, as the caller sees it: whom to tell how far it is, and what stops it.
+///
+/// ```
+/// use loopsight_diagnosis::{CancelToken, Work};
+///
+/// let token = CancelToken::new();
+/// let report = |p: &loopsight_diagnosis::Progress| eprintln!("{} {}/{}", p.stage.text(), p.done, p.total);
+/// let work = Work::reporting(&report).stopped_by(&token);
+/// # drop(work);
+/// ```
+#[derive(Clone, Default)]
+pub struct Work<'a> {
+    report: Option<Report<'a>>,
+    token: CancelToken,
+    round: usize,
+}
+
+impl std::fmt::Debug for Work<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Work")
+            .field("reports", &self.report.is_some())
+            .field("token", &self.token)
+            .field("round", &self.round)
+            .finish()
+    }
+}
+
+impl<'a> Work<'a> {
+    /// Work that tells nobody and goes on to its end.
+    pub fn quiet() -> Self {
+        Self::default()
+    }
+
+    /// Work that calls `report` from time to time, from any of its threads.
+    pub fn reporting(report: &'a (dyn Fn(&Progress) + Sync)) -> Self {
+        Self {
+            report: Some(report),
+            ..Self::default()
+        }
+    }
+
+    /// The same work, stopped by `token`.
+    #[must_use]
+    pub fn stopped_by(mut self, token: &CancelToken) -> Self {
+        self.token = token.clone();
+        self
+    }
+
+    /// Whether it was cancelled.
+    pub fn is_cancelled(&self) -> bool {
+        self.token.is_cancelled()
+    }
+
+    /// A part of the work that tells nobody; the same token stops it.
+    pub(crate) fn silently(&self) -> Work<'static> {
+        Work {
+            report: None,
+            token: self.token.clone(),
+            round: self.round,
+        }
+    }
+
+    /// A round of the work.
+    pub(crate) fn in_round(&self, round: usize) -> Self {
+        Self {
+            round,
+            ..self.clone()
+        }
+    }
+
+    /// An error where the work was cancelled. Costs next to nothing: asked at every sample.
+    pub(crate) fn go_on(&self) -> Result<(), Cancelled> {
+        if self.is_cancelled() {
+            Err(Cancelled)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Says how far a stage is.
+    pub(crate) fn tell(&self, stage: Stage, done: u64, total: u64) {
+        self.tell_error(stage, done, total, None);
+    }
+
+    /// As [`Work::tell`], with the present error of a fit.
+    pub(crate) fn tell_error(&self, stage: Stage, done: u64, total: u64, error: Option<f64>) {
+        if let Some(report) = self.report {
+            report(&Progress {
+                round: self.round,
+                stage,
+                done,
+                total,
+                error,
+            });
+        }
+    }
+}
