@@ -201,6 +201,14 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis) -> Verdict {
             vec!["Nothing was fitted to it. What is wrong stands below.".to_owned()],
             "refused",
         ),
+        Conclusion::Cancelled => (
+            "The diagnosis was cancelled.".to_owned(),
+            vec![
+                "The explanations below were tried until then. Nothing can be concluded from them."
+                    .to_owned(),
+            ],
+            "refused",
+        ),
     };
     if let Some(held) = &diagnosis.observer {
         because.push(format!("Note: {}.", held.statement));
@@ -303,6 +311,10 @@ pub(crate) fn of_improvement(improvement: &Improvement) -> Verdict {
         Conclusion::DataInsufficient | Conclusion::LogFaulty => (
             "What is left does not show in this log: record what is advised below.".to_owned(),
             "refused",
+        ),
+        Conclusion::Cancelled => (
+            "The work was cancelled: more may be missing.".to_owned(),
+            "unknown",
         ),
     };
     Verdict {

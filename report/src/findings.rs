@@ -131,6 +131,7 @@ pub(crate) fn improvement(last: Conclusion) -> Improvement {
         nrmse_before: None,
         nrmse_fit: 0.02,
         iterations: 3,
+        cancelled: false,
         flat: vec![],
         model: model(1),
         history: vec![],

@@ -111,7 +111,9 @@ pub(crate) fn after_diagnosis(context: &Context, diagnosis: &Diagnosis) -> Vec<H
                 .into(),
             files.on_another("diagnose", "diagnosis.html"),
         )],
-        (Conclusion::DataInsufficient | Conclusion::LogFaulty, _) => again(&files, "diagnose"),
+        (Conclusion::DataInsufficient | Conclusion::LogFaulty | Conclusion::Cancelled, _) => {
+            again(&files, "diagnose")
+        }
     }
 }
 

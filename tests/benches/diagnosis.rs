@@ -11,7 +11,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use loopsight_diagnosis::diagnose;
+use loopsight_diagnosis::{Measurements, Work, diagnose};
 use loopsight_hidden::{Hidden, Recording, Robot, record_along};
 use loopsight_model::model::Model;
 use loopsight_model::simulate::{Simulator, free_run};
@@ -64,7 +64,11 @@ fn free_run_takes(model: &Model, log: &Recording) -> f64 {
 /// Seconds that a diagnosis takes, and what it concludes.
 fn diagnosis_takes(model: &Model, log: &Recording) -> (f64, String) {
     let from = Instant::now();
-    let found = diagnose(model, std::slice::from_ref(&log.run), None, &[], &|_, _| {});
+    let found = diagnose(
+        model,
+        &Measurements::new(std::slice::from_ref(&log.run)),
+        &Work::quiet(),
+    );
     let found = found.expect("a log that can be diagnosed");
     let named = found.missing.map_or("nothing".to_owned(), |p| p.effect);
     (from.elapsed().as_secs_f64(), named)

@@ -12,7 +12,9 @@
 
 use std::fmt::Write as _;
 
-use loopsight_diagnosis::{Conclusion, Diagnosis, Explanation, Place, diagnose};
+use loopsight_diagnosis::{
+    Conclusion, Diagnosis, Explanation, Measurements, Place, Work, diagnose,
+};
 use loopsight_hidden::{Experiment, Hidden, Robot, catalogue, record_with, refit};
 use loopsight_model::model::Model;
 use loopsight_plants as _;
@@ -184,7 +186,12 @@ fn try_one(
     let (model, _) = Model::from_toml("hidden", &log.model_toml).ok()?;
     let runs = [log.run.clone()];
     let tests = [test.run.clone()];
-    let diagnosis = diagnose(&model, &runs, Some(&tests), &[], &|_, _| {}).ok()?;
+    let diagnosis = diagnose(
+        &model,
+        &Measurements::new(&runs).tested_on(Some(&tests)),
+        &Work::quiet(),
+    )
+    .ok()?;
     let hidden_well = effect.is_some() && refit(&log).left(&log) < INVISIBLE * log.floor();
     let what = effect.map_or_else(|| "clean".to_owned(), |e| robot.case(Some(e)));
     let truth = log.truth.hidden.first();

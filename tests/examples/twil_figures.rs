@@ -11,6 +11,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use loopsight_controllers as _;
+use loopsight_diagnosis::{Measurements, Work};
 use loopsight_drivers::{Limit, Simulated};
 use loopsight_estimators as _;
 use loopsight_model::config::{Source, read_text};
@@ -79,7 +80,11 @@ fn against_log(model: &Model, log: &Path) -> Outcome<Vec<FigurePanel>> {
     let measurable: Vec<_> = model.measured.iter().map(|m| *m.signal).collect();
     let recording =
         loopsight_recordings::map(&source, model.plant.inputs, &measurable, &model.log)?;
-    let comparison = loopsight_diagnosis::compare(model, &recording.runs, &recording.faults)?;
+    let comparison = loopsight_diagnosis::compare(
+        model,
+        &Measurements::new(&recording.runs).with_faults(&recording.faults),
+        &Work::quiet(),
+    )?;
     let run = comparison.runs.first().ok_or("the log has no run")?;
     Ok(run
         .signals

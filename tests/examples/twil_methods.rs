@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use loopsight_diagnosis::fit::fit;
-use loopsight_diagnosis::{FitSettings, Method, Scheme};
+use loopsight_diagnosis::{FitSettings, Measurements, Method, Scheme, Work};
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_estimators as _;
 use loopsight_model::excitation::{Excitation, build, sample_rows};
@@ -114,11 +114,9 @@ fn find(model: &Model, run: &Run, settings: &FitSettings) -> Outcome<Vec<Found>>
     }
     let fit = fit(
         &start,
-        std::slice::from_ref(run),
-        None,
-        &[],
+        &Measurements::new(std::slice::from_ref(run)),
         settings,
-        &|_, _| {},
+        &Work::quiet(),
     )?;
     free(model)
         .map(|(name, _)| {

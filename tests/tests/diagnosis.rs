@@ -6,7 +6,7 @@
     reason = "helpers of tests: a failure is the test's failure"
 )]
 
-use loopsight_diagnosis::{Conclusion, Diagnosis, diagnose};
+use loopsight_diagnosis::{Conclusion, Diagnosis, Measurements, Work, diagnose};
 use loopsight_hidden::{Experiment, Hidden, Recording, record_with};
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
@@ -31,10 +31,8 @@ fn judge(log: &Recording, test: Option<&Recording>) -> Diagnosis {
     let tests = test.map(|t| vec![t.run.clone()]);
     diagnose(
         &model(log),
-        std::slice::from_ref(&log.run),
-        tests.as_deref(),
-        &[],
-        &|_, _| {},
+        &Measurements::new(std::slice::from_ref(&log.run)).tested_on(tests.as_deref()),
+        &Work::quiet(),
     )
     .unwrap()
 }
@@ -125,7 +123,12 @@ fn constant_inputs_and_short_logs_are_refused_with_the_reason() {
     let short = Run {
         ..recording.run.part(0..150)
     };
-    let refused = diagnose(&model(&recording), &[short], None, &[], &|_, _| {}).unwrap();
+    let refused = diagnose(
+        &model(&recording),
+        &Measurements::new(&[short]),
+        &Work::quiet(),
+    )
+    .unwrap();
     assert_eq!(refused.verdict, Conclusion::DataInsufficient);
     assert!(
         refused.advice[0].why.contains("1.49 s"),
@@ -186,7 +189,7 @@ fn real_logs_show_their_friction() {
             .map(|m| (m.id.clone(), m.sensor.clone()))
             .collect();
         model.measure(&measured).unwrap();
-        let found = diagnose(&model, &recording.runs, None, &[], &|_, _| {}).unwrap();
+        let found = diagnose(&model, &Measurements::new(&recording.runs), &Work::quiet()).unwrap();
         assert_eq!(found.verdict, Conclusion::EffectMissing, "{file}");
         let level = found
             .candidates

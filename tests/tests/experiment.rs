@@ -9,7 +9,8 @@
 
 use assert_cmd::Command;
 use loopsight_diagnosis::{
-    Conclusion, Diagnosis, Limits, Plan, Promise, Question, diagnose, experiment, place,
+    Conclusion, Diagnosis, Limits, Measurements, Plan, Promise, Question, Work, diagnose,
+    experiment, place,
 };
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_hidden::{Hidden, Robot, record_along};
@@ -31,7 +32,7 @@ fn limits(limit: f64) -> Limits {
 
 fn separate(model: &Model, a: &str, b: &str) -> Plan {
     let question = Question::Separate(place(model, a).unwrap(), Some(place(model, b).unwrap()));
-    experiment(model, &question, &limits(9.0)).unwrap()
+    experiment(model, &question, &limits(9.0), &Work::quiet()).unwrap()
 }
 
 /// The Twil with an effect where it is tried first.
@@ -58,7 +59,7 @@ fn record(robot: &Model, plan: &Plan, seed: u64) -> Run {
 }
 
 fn asked(run: Run) -> Diagnosis {
-    diagnose(&twil(), &[run], None, &[], &|_, _| {}).unwrap()
+    diagnose(&twil(), &Measurements::new(&[run]), &Work::quiet()).unwrap()
 }
 
 /// What the machine that is no model of ours, and hides something, does with the plan.
@@ -84,7 +85,7 @@ fn a_plan_splits_the_class_on_the_hidden_machine() {
         let plan = separate(&twil(), hidden.id(), rival);
         assert_eq!(plan.verdict, Promise::Answers, "{}", plan.reason);
         let (model, run) = hidden_machine(hidden, size, &plan, 3);
-        let found = diagnose(&model, &[run], None, &[], &|_, _| {}).unwrap();
+        let found = diagnose(&model, &Measurements::new(&[run]), &Work::quiet()).unwrap();
         assert_eq!(found.missing.unwrap().effect, hidden.id());
         let class = &found.candidates[0].indistinguishable_from;
         assert!(class.iter().all(|p| p.effect != rival), "{class:?}");
@@ -145,7 +146,7 @@ fn what_no_inputs_separate_is_said_to_be_so() {
     }
     // No measured signal depends on the half track: its gain is the encoder's, measured by ruler.
     let pin = Question::Pin("half_track".to_owned());
-    let plan = experiment(&twil(), &pin, &limits(9.0)).unwrap();
+    let plan = experiment(&twil(), &pin, &limits(9.0), &Work::quiet()).unwrap();
     assert_eq!(plan.verdict, Promise::CannotBeSeparated, "{}", plan.reason);
 }
 
@@ -158,7 +159,7 @@ fn plans_keep_the_limit_begin_and_end_at_rest_and_repeat() {
         Question::Separate(place(&model, "dead_zone@input.left").unwrap(), None),
     ];
     for (question, limit) in questions.into_iter().zip([3.0, 9.0, 6.0]) {
-        let plan = experiment(&model, &question, &limits(limit)).unwrap();
+        let plan = experiment(&model, &question, &limits(limit), &Work::quiet()).unwrap();
         let Plan { drive, .. } = &plan;
         let n = drive.inputs.len();
         assert!(drive.inputs.iter().all(|v| v.abs() <= limit));
@@ -168,7 +169,7 @@ fn plans_keep_the_limit_begin_and_end_at_rest_and_repeat() {
         let last = drive.time.last().unwrap();
         assert!((last - plan.duration_s).abs() < PERIOD);
         assert!((5.0..=600.0).contains(&plan.duration_s));
-        let again = experiment(&model, &question, &limits(limit)).unwrap();
+        let again = experiment(&model, &question, &limits(limit), &Work::quiet()).unwrap();
         assert_eq!(again.drive, plan.drive);
         assert_eq!(again.reason, plan.reason);
     }
@@ -183,12 +184,17 @@ fn a_pinned_parameter_comes_out_as_sharp_as_was_said() {
         duration: Some(20.0),
         ..limits(9.0)
     };
-    let plan = experiment(&model, &question, &short).unwrap();
+    let plan = experiment(&model, &question, &short, &Work::quiet()).unwrap();
     let predicted = 3.945 / plan.detectability;
     let run = record(&model, &plan, 7);
     let settings = loopsight_diagnosis::FitSettings::default();
-    let fit =
-        loopsight_diagnosis::fit::fit(&model, &[run], None, &[], &settings, &|_, _| {}).unwrap();
+    let fit = loopsight_diagnosis::fit::fit(
+        &model,
+        &Measurements::new(&[run]),
+        &settings,
+        &Work::quiet(),
+    )
+    .unwrap();
     let found = &fit.parameters["K_E"];
     assert!(
         (found.value + 3.945).abs() < 4.0 * predicted,

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use loopsight_diagnosis::fit::fit;
-use loopsight_diagnosis::{Conclusion, FitSettings, diagnose};
+use loopsight_diagnosis::{Conclusion, FitSettings, Measurements, Work, diagnose};
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_model::excitation::{Excitation, build, sample_rows};
 use loopsight_model::model::Model;
@@ -79,11 +79,9 @@ fn a_fit_finds_the_parameters_of_expressions() {
     let settings = FitSettings::default();
     let found = fit(
         &unknown(truth.clone()),
-        &[run],
-        None,
-        &[],
+        &Measurements::new(&[run]),
         &settings,
-        &|_, _| {},
+        &Work::quiet(),
     )
     .unwrap();
     let mut checked = 0;
@@ -108,7 +106,7 @@ fn a_diagnosis_names_what_an_expression_plant_lacks() {
     let (plant, rest) = AXIS.split_once("[[effect]]").unwrap();
     let plain = format!("{plant}{}", &rest[rest.find("[log.").unwrap()..]);
     let run = record(&model(&format!("{plain}{FRICTION}")));
-    let diagnosis = diagnose(&model(&plain), &[run], None, &[], &|_, _| {}).unwrap();
+    let diagnosis = diagnose(&model(&plain), &Measurements::new(&[run]), &Work::quiet()).unwrap();
     assert_eq!(diagnosis.verdict, Conclusion::EffectMissing);
     let best = &diagnosis.candidates[0];
     let mut class = std::iter::once(&best.place).chain(&best.indistinguishable_from);

@@ -10,8 +10,8 @@
 use assert_cmd::Command;
 use loopsight_diagnosis::fit::{Fit, fit};
 use loopsight_diagnosis::{
-    Because, Conclusion, FitSettings, Limits, Question, QuestionError, compare, diagnose,
-    experiment,
+    Because, Conclusion, FitSettings, Limits, Measurements, Question, QuestionError, Work, compare,
+    diagnose, experiment,
 };
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
@@ -26,7 +26,7 @@ const OFF: [f64; 3] = [1.25, 0.75, 0.8];
 
 fn fitted(model: &Model, run: Run) -> Fit {
     let settings = FitSettings::default();
-    fit(model, &[run], None, &[], &settings, &|_, _| {}).unwrap()
+    fit(model, &Measurements::new(&[run]), &settings, &Work::quiet()).unwrap()
 }
 
 /// How many of the intervals of `fits` hold the truth.
@@ -94,8 +94,18 @@ fn a_pole_needs_no_first_guess() {
 fn a_wrong_model_of_a_pole_is_compared_without_running_away() {
     let truth = cart_pole([1.0; 3], "", true);
     let run = upright(&truth, 30.0, 1);
-    let right = compare(&truth, std::slice::from_ref(&run), &[]).unwrap();
-    let wrong = compare(&cart_pole(OFF, "", true), &[run], &[]).unwrap();
+    let right = compare(
+        &truth,
+        &Measurements::new(std::slice::from_ref(&run)),
+        &Work::quiet(),
+    )
+    .unwrap();
+    let wrong = compare(
+        &cart_pole(OFF, "", true),
+        &Measurements::new(&[run]),
+        &Work::quiet(),
+    )
+    .unwrap();
     assert!(right.nrmse < 0.2, "{}", right.nrmse);
     assert!(wrong.nrmse > 2.0 * right.nrmse && wrong.nrmse < 2.0);
     let json = serde_json::to_value(&wrong).unwrap();
@@ -107,7 +117,12 @@ fn a_wrong_model_of_a_pole_is_compared_without_running_away() {
 fn nothing_is_missing_from_a_pole_without_a_secret() {
     let truth = cart_pole([1.0; 3], "", true);
     let run = upright(&truth, 30.0, 5);
-    let told = diagnose(&cart_pole(OFF, "", true), &[run], None, &[], &|_, _| {}).unwrap();
+    let told = diagnose(
+        &cart_pole(OFF, "", true),
+        &Measurements::new(&[run]),
+        &Work::quiet(),
+    )
+    .unwrap();
     assert_eq!(
         told.verdict,
         Conclusion::NothingMissing,
@@ -165,7 +180,12 @@ fn an_axis_that_drifts_is_diagnosed() {
         "[[effect]]\n[effect.coulomb_friction]\nat = [\"shaft\"]\nlevel = 0.1\nwidth = 0.02\n";
     let told = |effects: &str| {
         let run = servo(&axis([1.0; 2], effects), 30.0, 5, 0.02);
-        diagnose(&axis([1.3, 0.75], ""), &[run], None, &[], &|_, _| {}).unwrap()
+        diagnose(
+            &axis([1.3, 0.75], ""),
+            &Measurements::new(&[run]),
+            &Work::quiet(),
+        )
+        .unwrap()
     };
     let clean = told("");
     assert_eq!(
@@ -186,7 +206,7 @@ fn no_experiment_is_planned_for_what_falls_over() {
         limit: 2.0,
         period: PERIOD,
     };
-    let plan = |model: &Model| experiment(model, &Question::All, &limits);
+    let plan = |model: &Model| experiment(model, &Question::All, &limits, &Work::quiet());
     let falls = plan(&cart_pole([1.0; 3], "", true)).err();
     assert!(matches!(falls, Some(QuestionError::Unstable)), "{falls:?}");
     assert!(plan(&axis([1.0; 2], "")).is_ok());
@@ -196,7 +216,12 @@ fn no_experiment_is_planned_for_what_falls_over() {
 #[test]
 fn a_damped_axis_runs_freely() {
     let truth = axis([100.0, 10.0], "");
-    let compared = compare(&truth, &[servo(&truth, 30.0, 1, 0.02)], &[]).unwrap();
+    let compared = compare(
+        &truth,
+        &Measurements::new(&[servo(&truth, 30.0, 1, 0.02)]),
+        &Work::quiet(),
+    )
+    .unwrap();
     assert_eq!(compared.observer, None);
     let json = serde_json::to_value(&compared).unwrap();
     assert!(json.get("observer").is_none());

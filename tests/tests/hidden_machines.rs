@@ -5,7 +5,7 @@
     reason = "recordings that can be made, and a panic is how this program fails"
 )]
 
-use loopsight_diagnosis::{FitSettings, diagnose, fit};
+use loopsight_diagnosis::{FitSettings, Measurements, Work, diagnose, fit};
 use loopsight_hidden::{Experiment, Hidden, Robot, record};
 use loopsight_model::model::Model;
 use loopsight_plants as _;
@@ -19,14 +19,14 @@ fn explained(robot: Robot) {
     let tests = [test.run.clone()];
     let found = fit::fit(
         &model,
-        std::slice::from_ref(&log.run),
-        Some(&tests),
-        &[],
+        &Measurements::new(std::slice::from_ref(&log.run)).tested_on(Some(&tests)),
         &settings,
-        &|_, _| {},
+        &Work::quiet(),
     )
     .unwrap();
-    let left = loopsight_diagnosis::compare(&found.model, &tests, &[]).unwrap();
+    let left =
+        loopsight_diagnosis::compare(&found.model, &Measurements::new(&tests), &Work::quiet())
+            .unwrap();
     println!(
         "{}: {:.3} % of another recording, floor {:.3} %",
         robot.name(),
@@ -60,7 +60,12 @@ fn a_spring_is_found_where_its_position_is_measured() {
     let (model, _) = Model::from_toml("hidden", &log.model_toml).unwrap();
     let tests = [test.run];
     let runs = std::slice::from_ref(&log.run);
-    let found = diagnose(&model, runs, Some(&tests), &[], &|_, _| {}).unwrap();
+    let found = diagnose(
+        &model,
+        &Measurements::new(runs).tested_on(Some(&tests)),
+        &Work::quiet(),
+    )
+    .unwrap();
     assert_eq!(found.missing.unwrap().effect, "cubic_stiffness");
 }
 

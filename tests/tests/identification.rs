@@ -6,7 +6,7 @@
     reason = "what is built here is right, and a panic is how this program fails"
 )]
 
-use loopsight_diagnosis::{Fit, FitSettings, Method, Scheme, fit::fit};
+use loopsight_diagnosis::{Fit, FitSettings, Measurements, Method, Scheme, Work, fit::fit};
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
@@ -27,11 +27,9 @@ fn fitted(model: &Model, run: Run, method: Method, scheme: Scheme) -> Fit {
     };
     fit(
         &unknown(model.clone()),
-        &[run],
-        None,
-        &[],
+        &Measurements::new(&[run]),
         &settings,
-        &|_, _| {},
+        &Work::quiet(),
     )
     .unwrap()
 }

@@ -6,7 +6,7 @@
     reason = "what is damaged here was right, and a panic is how this program fails"
 )]
 
-use loopsight_diagnosis::{FitSettings, Method, compare, fit::fit};
+use loopsight_diagnosis::{FitSettings, Measurements, Method, Work, compare, fit::fit};
 use loopsight_model::config::Source;
 use loopsight_model::loop_file::LoopFile;
 use loopsight_model::model::Model;
@@ -108,7 +108,11 @@ fn use_model(text: &str) -> bool {
             let _ = model.affine();
             // A damaged step could ask for any amount of work.
             if model.max_step > 1e-4 {
-                let _ = compare(&model, &[short_run(&model)], &[]);
+                let _ = compare(
+                    &model,
+                    &Measurements::new(&[short_run(&model)]),
+                    &Work::quiet(),
+                );
             }
             true
         }
@@ -240,8 +244,17 @@ fn damaged_logs_never_panic() {
             .collect();
         let mut model = model.clone();
         model.measure(&list).unwrap();
-        let _ = compare(&model, &recording.runs, &recording.faults);
-        let _ = fit(&model, &recording.runs, None, &[], &settings, &|_, _| {});
+        let _ = compare(
+            &model,
+            &Measurements::new(&recording.runs).with_faults(&recording.faults),
+            &Work::quiet(),
+        );
+        let _ = fit(
+            &model,
+            &Measurements::new(&recording.runs),
+            &settings,
+            &Work::quiet(),
+        );
         true
     });
     println!("{read} of 400 still read");

@@ -10,7 +10,9 @@
 use std::ops::Range;
 
 use loopsight_core::Signal;
-use loopsight_diagnosis::{Comparison, Conclusion, Fit, FitSettings, compare, diagnose, fit};
+use loopsight_diagnosis::{
+    Comparison, Conclusion, Fit, FitSettings, Measurements, Work, compare, diagnose, fit,
+};
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_tests::{real_data, repository};
@@ -45,7 +47,7 @@ const ALL: Range<usize> = 0..usize::MAX;
 
 fn fitted(model: &Model, runs: &[Run]) -> Fit {
     let settings = FitSettings::default();
-    fit::fit(model, runs, None, &[], &settings, &|_, _| {}).unwrap()
+    fit::fit(model, &Measurements::new(runs), &settings, &Work::quiet()).unwrap()
 }
 
 fn value(fit: &Fit, name: &str) -> f64 {
@@ -54,7 +56,10 @@ fn value(fit: &Fit, name: &str) -> f64 {
 
 /// Root mean square of the free-run error of the only signal.
 fn rmse(model: &Model, runs: &[Run]) -> f64 {
-    compare(model, runs, &[]).unwrap().signals[0].rmse
+    compare(model, &Measurements::new(runs), &Work::quiet())
+        .unwrap()
+        .signals[0]
+        .rmse
 }
 
 /// Wigren, Schoukens (2013): the test is the first 40 650 samples, an arrowhead; a linear model leaves
@@ -83,7 +88,12 @@ fn the_silverbox_has_a_cubic_spring() {
     // From the linear model, and from little: the spring is named.
     let few = [train[0].part(0..6000)];
     let ending = [test[0].part(30_000..40_000)];
-    let diagnosis = diagnose(&plain.model, &few, Some(&ending), &[], &|_, _| {}).unwrap();
+    let diagnosis = diagnose(
+        &plain.model,
+        &Measurements::new(&few).tested_on(Some(&ending)),
+        &Work::quiet(),
+    )
+    .unwrap();
     let missing = diagnosis.missing.unwrap();
     println!("Silverbox: the linear model lacks {missing:?}");
     assert_eq!(diagnosis.verdict, Conclusion::EffectMissing);
@@ -136,7 +146,7 @@ fn emps_is_identified_through_its_loop() {
     let directed = fitted(&directional, &log);
     let errors = |fit: &Fit| {
         [&log, &pulses].map(|runs| {
-            let held = compare(&fit.model, runs, &[]).unwrap();
+            let held = compare(&fit.model, &Measurements::new(runs), &Work::quiet()).unwrap();
             [relative(&held, |x| x.to_vec()), relative(&held, low_pass)]
         })
     };
@@ -206,7 +216,7 @@ fn a_geared_motor_has_a_threshold() {
     let Some(log) = recording(&mut plain, file, ALL) else {
         return;
     };
-    let diagnosis = diagnose(&plain, &log, None, &[], &|_, _| {}).unwrap();
+    let diagnosis = diagnose(&plain, &Measurements::new(&log), &Work::quiet()).unwrap();
     assert_eq!(diagnosis.verdict, Conclusion::EffectMissing);
     let best = &diagnosis.candidates[0];
     let alike = best.indistinguishable_from.iter();

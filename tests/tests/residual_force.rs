@@ -8,7 +8,8 @@
 use std::f64::consts::{PI, TAU};
 
 use loopsight_diagnosis::{
-    Conclusion, Diagnosis, FitSettings, ResidualForce, diagnose, fit, residual_force,
+    Conclusion, Diagnosis, FitSettings, Measurements, ResidualForce, Work, diagnose, fit,
+    residual_force,
 };
 use loopsight_hidden::Driven as Robot;
 use loopsight_model::excitation::{Excitation, Sequence};
@@ -97,7 +98,12 @@ fn levels(seed: u64) -> Excitation {
 
 fn judge(robot: Robot, run: &Run) -> Diagnosis {
     let model = Model::from_toml("hidden", &robot.model_toml()).unwrap().0;
-    diagnose(&model, std::slice::from_ref(run), None, &[], &|_, _| {}).unwrap()
+    diagnose(
+        &model,
+        &Measurements::new(std::slice::from_ref(run)),
+        &Work::quiet(),
+    )
+    .unwrap()
 }
 
 fn force(diagnosis: &Diagnosis) -> &ResidualForce {
@@ -197,8 +203,14 @@ fn noise_has_no_shape() {
 fn described(robot: Robot, run: &Run) -> Option<ResidualForce> {
     let model = Model::from_toml("hidden", &robot.model_toml()).unwrap().0;
     let runs = std::slice::from_ref(run);
-    let fitted = fit::fit(&model, runs, None, &[], &FitSettings::default(), &|_, _| {}).unwrap();
-    residual_force(&fitted.model, runs)
+    let fitted = fit::fit(
+        &model,
+        &Measurements::new(runs),
+        &FitSettings::default(),
+        &Work::quiet(),
+    )
+    .unwrap();
+    residual_force(&fitted.model, runs, &Work::quiet()).unwrap()
 }
 
 /// What is printed can be pasted: the file is read, fitted, and the error falls to the noise.
@@ -214,10 +226,17 @@ fn the_printed_expression_makes_the_error_fall() {
         let runs = std::slice::from_ref(&run);
         let fitted = |text: &str| {
             let model = Model::from_toml("hidden", text).unwrap().0;
-            fit::fit(&model, runs, None, &[], &FitSettings::default(), &|_, _| {}).unwrap()
+            fit::fit(
+                &model,
+                &Measurements::new(runs),
+                &FitSettings::default(),
+                &Work::quiet(),
+            )
+            .unwrap()
         };
         let plain = fitted(&robot.model_toml());
-        let found = residual_force(&plain.model, runs).unwrap();
+        let found = residual_force(&plain.model, runs, &Work::quiet());
+        let found = found.unwrap().unwrap();
         let expression = found.expression.unwrap();
         for variable in variables {
             assert!(expression.force.contains(variable), "{}", expression.force);

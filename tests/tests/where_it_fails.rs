@@ -5,7 +5,7 @@
     reason = "helpers of tests: a failure is the test's failure"
 )]
 
-use loopsight_diagnosis::{Statement, compare};
+use loopsight_diagnosis::{Measurements, Statement, Work, compare};
 use loopsight_hidden::{Experiment, Hidden, Robot, record};
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
@@ -32,7 +32,9 @@ fn of<'a>(said: &'a [Statement], part: &str) -> Option<&'a Statement> {
 #[test]
 fn friction_is_told_by_direction() {
     let (model, run) = stiff_axis();
-    let said = compare(&model, &[run], &[]).unwrap().where_it_fails;
+    let said = compare(&model, &Measurements::new(&[run]), &Work::quiet())
+        .unwrap()
+        .where_it_fails;
     let direction = of(&said, "in the positive direction and").unwrap();
     assert!(
         direction
@@ -55,7 +57,11 @@ fn a_bad_run_is_named_or_numbered() {
     for y in &mut runs[1].measured[300..500] {
         *y += 30.0;
     }
-    let said = |runs: &[Run]| compare(&model, runs, &[]).unwrap().where_it_fails;
+    let said = |runs: &[Run]| {
+        compare(&model, &Measurements::new(runs), &Work::quiet())
+            .unwrap()
+            .where_it_fails
+    };
     assert!(of(&said(&runs), "of speed is in run 2, which is 33 %").is_some());
     for (run, name) in runs.iter_mut().zip(["slow", "fast", "back"]) {
         run.name = name.to_owned();
@@ -67,5 +73,10 @@ fn a_bad_run_is_named_or_numbered() {
 fn what_was_not_measured_is_no_reason_to_fail() {
     let (model, mut run) = stiff_axis();
     run.measured.fill(f64::NAN);
-    assert_eq!(compare(&model, &[run], &[]).unwrap().where_it_fails, []);
+    assert_eq!(
+        compare(&model, &Measurements::new(&[run]), &Work::quiet())
+            .unwrap()
+            .where_it_fails,
+        []
+    );
 }

@@ -1,13 +1,13 @@
 //! `loopsight compare`.
 
-use loopsight_diagnosis::{FitSettings, compare, fit};
+use loopsight_diagnosis::{FitSettings, Measurements, Work, compare, fit};
 use loopsight_report::{Context, comparison_page, save};
 
 use crate::cli::arguments::CompareOptions;
 use crate::cli::commands::fit::watch;
 use crate::cli::failure::Failure;
 use crate::cli::load::{model_and_log, refuse_fatal, writable};
-use crate::cli::output;
+use crate::cli::{output, progress};
 
 pub(crate) fn run(options: &CompareOptions) -> Result<(), Failure> {
     options.html.as_deref().map_or(Ok(()), writable)?;
@@ -24,16 +24,18 @@ pub(crate) fn run(options: &CompareOptions) -> Result<(), Failure> {
         let bar = watch("fitting");
         let fitted = fit::fit(
             &loaded.model,
-            &loaded.runs,
-            None,
-            &loaded.faults,
+            &Measurements::new(&loaded.runs).with_faults(&loaded.faults),
             &FitSettings::default(),
-            &|i, e| bar.set_message(format!("iteration {i}, error {}", output::percent(e))),
+            &Work::reporting(&progress::counted(&bar)),
         );
         bar.finish_and_clear();
         fitted?.comparison
     } else {
-        compare(&loaded.model, &loaded.runs, &loaded.faults)?
+        compare(
+            &loaded.model,
+            &Measurements::new(&loaded.runs).with_faults(&loaded.faults),
+            &Work::quiet(),
+        )?
     };
     for note in &notes {
         output::note(note);

@@ -1,6 +1,8 @@
 //! `loopsight diagnose`.
 
-use loopsight_diagnosis::{Comparison, Conclusion, Diagnosis, Explanation, compare, diagnose};
+use loopsight_diagnosis::{
+    Comparison, Conclusion, Diagnosis, Explanation, Measurements, Work, compare, diagnose,
+};
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_report::{Context, diagnosis_page, save};
@@ -18,13 +20,10 @@ pub(crate) fn run(options: &DiagnoseOptions) -> Result<(), Failure> {
     let bar = progress::bar("trying effects", 1);
     let diagnosis = diagnose(
         &loaded.model,
-        &loaded.runs,
-        test.as_deref(),
-        &loaded.faults,
-        &|done, total| {
-            bar.set_length(total);
-            bar.set_position(done);
-        },
+        &Measurements::new(&loaded.runs)
+            .tested_on(test.as_deref())
+            .with_faults(&loaded.faults),
+        &Work::reporting(&progress::shown(&bar)),
     );
     bar.finish_and_clear();
     let diagnosis = diagnosis?;
@@ -47,7 +46,7 @@ pub(crate) fn run(options: &DiagnoseOptions) -> Result<(), Failure> {
 /// `model` held against `runs` for a page; none where it cannot be simulated over them, for then
 /// the page has enough to say without.
 pub(crate) fn pictures(model: Option<&Model>, runs: &[Run]) -> Option<Comparison> {
-    compare(model?, runs, &[]).ok()
+    compare(model?, &Measurements::new(runs), &Work::quiet()).ok()
 }
 
 /// What a page is about.
@@ -89,6 +88,7 @@ pub(crate) fn sentence(diagnosis: &Diagnosis) -> String {
         (Conclusion::DataInsufficient, _) => {
             "The recording cannot carry the model: nothing was fitted.".to_owned()
         }
+        (Conclusion::Cancelled, _) => "The diagnosis was cancelled.".to_owned(),
         _ => format!(
             "Nothing is missing: the error of {nominal} is what noise and resolution leave ({}).",
             output::percent(diagnosis.floor.nrmse)

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use loopsight_diagnosis::{Limits, Plan, Promise, Question, QuestionError, experiment, place};
+use loopsight_diagnosis::{
+    Limits, Plan, Promise, Question, QuestionError, Work, experiment, place,
+};
 use loopsight_model::model::Model;
 use loopsight_recordings::{header, write_csv};
 use serde::Serialize;
@@ -38,7 +40,9 @@ pub(crate) fn run(options: &ExperimentOptions) -> Result<(), Failure> {
         duration: options.duration,
     };
     let bar = progress::bar("simulating experiments", 1);
-    let plan = question(options, &model).and_then(|q| experiment(&model, &q, &limits));
+    let shown = progress::shown(&bar);
+    let work = Work::reporting(&shown);
+    let plan = question(options, &model).and_then(|q| experiment(&model, &q, &limits, &work));
     bar.finish_and_clear();
     let plan = plan.map_err(wrong)?;
     let answers = plan.verdict != Promise::CannotBeSeparated;

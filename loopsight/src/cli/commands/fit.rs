@@ -2,7 +2,7 @@
 
 use indicatif::ProgressBar;
 use loopsight_core::Parameter;
-use loopsight_diagnosis::{Fit, FitSettings, Method, Scheme, fit};
+use loopsight_diagnosis::{Fit, FitSettings, Measurements, Method, Scheme, Work, fit};
 use loopsight_model::config::Step;
 use loopsight_report::{Context, fit_page, save};
 
@@ -33,16 +33,11 @@ pub(crate) fn run(options: &FitOptions) -> Result<(), Failure> {
     let bar = watch("fitting");
     let result = fit::fit(
         &loaded.model,
-        &loaded.runs,
-        test.as_deref(),
-        &loaded.faults,
+        &Measurements::new(&loaded.runs)
+            .tested_on(test.as_deref())
+            .with_faults(&loaded.faults),
         &settings,
-        &|i, e| {
-            bar.set_message(match settings.method {
-                Method::OutputError => format!("iteration {i}, error {}", output::percent(e)),
-                Method::Rls => format!("{} of the samples", output::percent(e)),
-            });
-        },
+        &Work::reporting(&progress::counted(&bar)),
     );
     bar.finish_and_clear();
     let result = result?;

@@ -1,6 +1,6 @@
 //! `loopsight improve`.
 
-use loopsight_diagnosis::{Improvement, improve};
+use loopsight_diagnosis::{Improvement, Measurements, Work, improve};
 use loopsight_model::config::{Source, Step};
 use loopsight_model::model::{Attached, Model, ModelParameter};
 use loopsight_report::{improvement_page, save};
@@ -20,14 +20,10 @@ pub(crate) fn run(options: &ImproveOptions) -> Result<(), Failure> {
     let bar = progress::bar("round 1", 1);
     let improvement = improve(
         &loaded.model,
-        &loaded.runs,
-        test.as_deref(),
-        &loaded.faults,
-        &|round, done, total| {
-            bar.set_prefix(format!("round {}", round + 1));
-            bar.set_length(total);
-            bar.set_position(done);
-        },
+        &Measurements::new(&loaded.runs)
+            .tested_on(test.as_deref())
+            .with_faults(&loaded.faults),
+        &Work::reporting(&progress::shown(&bar)),
     );
     bar.finish_and_clear();
     let improvement = improvement?;
