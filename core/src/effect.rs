@@ -1,6 +1,6 @@
 //! Effects: physics that can be added to a plant, at its channels.
 
-use crate::{Parameter, PlaceKind, Real, Role};
+use crate::{Array, Parameter, PlaceKind, Real, Role};
 
 /// What an effect says about itself.
 #[derive(Clone, Copy, Debug)]
@@ -147,28 +147,82 @@ impl<S: Real> Past<S> for NoPast {
     }
 }
 
+/// The arrays of an effect, as long as its [`EffectMeta`] says. Written by
+/// [`declare_effect!`](crate::declare_effect).
+#[diagnostic::on_unimplemented(
+    message = "the effect `{Self}` is not declared",
+    label = "its arrays are not known",
+    note = "write `declare_effect!({Self}, \"the_id_of_its_meta\");` beside `impl Effect for {Self}`"
+)]
+pub trait EffectArrays {
+    /// One element per state at one channel: `z`.
+    type State<T: Copy + Send>: Array<T> + Copy + Send;
+    /// One element per parameter: `p`.
+    type Parameters<T: Copy + Send>: Array<T> + Copy + Send;
+}
+
 /// A physical effect, as its author writes it: what it adds to a channel.
 ///
-/// `NP` parameters shared by all channels of an instance, `NZ` states per channel. The value is
-/// immutable; parameters and states live outside. Derivatives come from the scalar: a fit calls it
-/// with dual numbers, a microcontroller with `f32`.
-pub trait Effect<const NP: usize, const NZ: usize>: Sized + Send + Sync + 'static {
+/// Parameters are shared by all channels of an instance; states are one set per channel. The lengths of
+/// `p` and `z` are those of [`Effect::META`]: an author writes arrays, `p: &[S; 2]`, and an array of another
+/// length does not compile. The value is immutable; parameters and states live outside. Derivatives come
+/// from the scalar: a fit calls it with dual numbers, a microcontroller with `f32`.
+/// [`declare_effect!`](crate::declare_effect) does the rest.
+///
+/// ```
+/// use loopsight_core::{
+///     Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
+/// };
+///
+/// /// Drag of the air on a disc that turns: `w = -k ω |ω|`.
+/// struct DiscDrag;
+///
+/// impl Effect for DiscDrag {
+///     const META: EffectMeta = EffectMeta {
+///         id: "disc_drag",
+///         summary: "drag of the air on a disc",
+///         equation: "w = -k flow |flow|",
+///         reference: "Schlichting (1979), Boundary-Layer Theory, 7th ed., chapter V",
+///         places: &[PlaceKind::Effort],
+///         reads: &[Role::Flow],
+///         parameters: &[Parameter::new("k", "k", "channel/flow^2", "drag")],
+///         ..EffectMeta::PLAIN
+///     };
+///
+///     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 1]) -> S {
+///         let speed = at.get(Role::Flow);
+///         -p[0] * speed * speed.abs()
+///     }
+/// }
+///
+/// declare_effect!(DiscDrag, "disc_drag");
+///
+/// let speed = -3.0;
+/// let at = Reading::nothing().with(Role::Flow, &speed);
+/// assert_eq!(<DiscDrag as Effect>::contribution(&at, &[], &[0.1]), 0.9);
+/// ```
+pub trait Effect: EffectArrays + Sized + Send + Sync + 'static {
     /// Names, places, parameters, equation, symptom, remedy, reference.
     const META: EffectMeta;
 
     /// What is added to the channel, in the channel's unit.
-    fn contribution<S: Real>(at: &Reading<'_, S>, z: &[S; NZ], p: &[S; NP]) -> S;
+    fn contribution<S: Real>(at: &Reading<'_, S>, z: &Self::State<S>, p: &Self::Parameters<S>)
+    -> S;
 
     /// The rate of the effect's states.
-    fn state_derivative<S: Real>(at: &Reading<'_, S>, z: &[S; NZ], p: &[S; NP]) -> [S; NZ] {
+    fn state_derivative<S: Real>(
+        at: &Reading<'_, S>,
+        z: &Self::State<S>,
+        p: &Self::Parameters<S>,
+    ) -> Self::State<S> {
         let _ = (at, z, p);
-        [S::zero(); NZ]
+        Self::State::filled(S::zero())
     }
 
     /// The states at the start of a run, as if the reading had been constant before.
-    fn initial_state<S: Real>(at: &Reading<'_, S>, p: &[S; NP]) -> [S; NZ] {
+    fn initial_state<S: Real>(at: &Reading<'_, S>, p: &Self::Parameters<S>) -> Self::State<S> {
         let _ = (at, p);
-        [S::zero(); NZ]
+        Self::State::filled(S::zero())
     }
 }
 
@@ -185,27 +239,33 @@ pub trait Physics<S: Real>: Send + Sync {
 
 /// Makes an [`Effect`] available behind [`Physics`].
 ///
-/// The macro of the same name in `loopsight-model` does this and adds the effect to the registry, see
-/// [`declare_plant!`](crate::declare_plant).
+/// The sizes are those of [`Effect::META`]; an effect written for others does not compile. Nor does an id
+/// that is not the one in `META`.
 ///
-/// ```ignore
-/// declare_effect!(CoulombFriction, "coulomb_friction", <2, 0>);
-/// ```
+/// The macro of the same name in `loopsight-model` does this and adds the effect to the registry. A crate
+/// that builds with and without `std` chooses between the two once, in its `lib.rs`.
+///
+/// [`Effect`] has an example.
 #[macro_export]
 macro_rules! declare_effect {
-    ($effect:ident, $id:literal, <$np:literal, $nz:literal>) => {
+    ($effect:ident, $id:literal) => {
         const _: () = assert!(
-            <$effect as $crate::Effect<$np, $nz>>::META.parameters.len() == $np
-                && <$effect as $crate::Effect<$np, $nz>>::META.states == $nz,
-            "the sizes of the effect differ from its EffectMeta"
+            $crate::__private::same_text(<$effect as $crate::Effect>::META.id, $id),
+            "the id of the effect differs from that of its EffectMeta"
         );
+
+        impl $crate::EffectArrays for $effect {
+            type State<T: Copy + Send> = [T; <$effect as $crate::Effect>::META.states];
+            type Parameters<T: Copy + Send> =
+                [T; <$effect as $crate::Effect>::META.parameters.len()];
+        }
 
         impl<S: $crate::Real> $crate::Physics<S> for $effect {
             fn contribution(&self, at: &$crate::Reading<'_, S>, z: &[S], p: &[S]) -> S {
                 let (Ok(z), Ok(p)) = (z.try_into(), p.try_into()) else {
                     return S::of(0.0);
                 };
-                <$effect as $crate::Effect<$np, $nz>>::contribution(at, z, p)
+                <$effect as $crate::Effect>::contribution::<S>(at, z, p)
             }
             fn state_derivative(
                 &self,
@@ -217,8 +277,7 @@ macro_rules! declare_effect {
                 let (Ok(z), Ok(p)) = (z.try_into(), p.try_into()) else {
                     return;
                 };
-                let rate: [S; $nz] =
-                    <$effect as $crate::Effect<$np, $nz>>::state_derivative(at, z, p);
+                let rate = <$effect as $crate::Effect>::state_derivative::<S>(at, z, p);
                 for (to, from) in dz.iter_mut().zip(rate) {
                     *to = from;
                 }
@@ -227,7 +286,7 @@ macro_rules! declare_effect {
                 let Ok(p) = p.try_into() else {
                     return;
                 };
-                let state: [S; $nz] = <$effect as $crate::Effect<$np, $nz>>::initial_state(at, p);
+                let state = <$effect as $crate::Effect>::initial_state::<S>(at, p);
                 for (to, from) in z.iter_mut().zip(state) {
                     *to = from;
                 }

@@ -13,6 +13,7 @@
 
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
+mod array;
 mod channel;
 mod clock;
 mod controller;
@@ -32,6 +33,7 @@ mod tanh;
 mod tick;
 pub mod unit;
 
+pub use array::Array;
 pub use channel::{Channel, Place, PlaceKind, Reads, Role};
 #[cfg(feature = "std")]
 pub use clock::SystemClock;
@@ -39,14 +41,28 @@ pub use clock::{Clock, SimulatedClock};
 pub use controller::{AffineModel, Command, ControlError, Controller, Quantity};
 pub use derived::Derived;
 pub use driver::{Driver, DriverError, DriverFault, Sample};
-pub use effect::{Effect, EffectMeta, NoPast, Past, Physics, Reading};
+pub use effect::{Effect, EffectArrays, EffectMeta, NoPast, Past, Physics, Reading};
 pub use estimator::{Estimator, Innovation};
 pub use integrator::{Rk4, rk4_step, substeps};
 pub use limits::Limits;
 pub use parameter::Parameter;
-#[doc(hidden)]
-pub use plant::check_sizes as plant_check;
-pub use plant::{ControlAffine, Dynamics, MAX_STEP_S, Parameterization, Plant, PlantMeta};
+pub use plant::{
+    ControlAffine, Dynamics, MAX_STEP_S, Parameterization, Plant, PlantArrays, PlantMeta,
+};
 pub use real::Real;
 pub use signal::Signal;
 pub use tick::{Loop, Observation, Observer, Step, Tick, TickError};
+
+/// What the macros need of this crate.
+#[doc(hidden)]
+pub mod __private {
+    /// Two texts are the same, also in a constant.
+    pub const fn same_text(one: &str, other: &str) -> bool {
+        let (one, other) = (one.as_bytes(), other.as_bytes());
+        let mut i = 0;
+        while i < one.len() && i < other.len() && one[i] == other[i] {
+            i += 1;
+        }
+        i == one.len() && i == other.len()
+    }
+}

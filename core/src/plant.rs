@@ -1,6 +1,6 @@
 //! Plants: the static view authors write, and the object-safe view made from it.
 
-use crate::{Channel, Derived, Parameter, Real, Signal};
+use crate::{Array, Channel, Derived, Parameter, Place, Real, Signal};
 
 /// What a plant says about itself.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +37,42 @@ pub struct PlantMeta {
     pub controlled: &'static [usize],
 }
 
+impl PlantMeta {
+    /// Number of effort channels: the length of `w`.
+    pub const fn efforts(&self) -> usize {
+        let (mut efforts, mut i) = (0, 0);
+        while i < self.channels.len() {
+            if let Place::Effort(_) = self.channels[i].place {
+                efforts += 1;
+            }
+            i += 1;
+        }
+        efforts
+    }
+
+    /// Effort channels are numbered from 0 without gaps, and there are as many controlled states as inputs,
+    /// or none. [`declare_plant!`](crate::declare_plant) asks for it when a program is compiled.
+    pub const fn is_consistent(&self) -> bool {
+        let mut effort = 0;
+        while effort < self.efforts() {
+            let (mut found, mut i) = (0, 0);
+            while i < self.channels.len() {
+                if let Place::Effort(c) = self.channels[i].place
+                    && c == effort
+                {
+                    found += 1;
+                }
+                i += 1;
+            }
+            if found != 1 {
+                return false;
+            }
+            effort += 1;
+        }
+        self.controlled.is_empty() || self.controlled.len() == self.inputs.len()
+    }
+}
+
 /// Another set of parameters from which those of the equations follow.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameterization {
@@ -51,14 +87,80 @@ pub struct Parameterization {
 /// Longest integration step of a machine on wheels or a motor, s.
 pub const MAX_STEP_S: f64 = 0.0025;
 
+/// The arrays of a plant, as long as its [`PlantMeta`] says. Written by
+/// [`declare_plant!`](crate::declare_plant).
+#[diagnostic::on_unimplemented(
+    message = "the plant `{Self}` is not declared",
+    label = "its arrays are not known",
+    note = "write `declare_plant!({Self}, \"the_id_of_its_meta\");` beside `impl Plant for {Self}`"
+)]
+pub trait PlantArrays {
+    /// One element per state: `x`.
+    type State<T: Copy + Send>: Array<T> + Copy + Send;
+    /// One element per input: `u`. A [`ControlAffine`] plant has as many controlled states.
+    type Input<T: Copy + Send>: Array<T> + Copy + Send;
+    /// One element per effort channel: `w`.
+    type Effort<T: Copy + Send>: Array<T> + Copy + Send;
+    /// One element per parameter of the equations: `p`.
+    type Parameters<T: Copy + Send>: Array<T> + Copy + Send;
+}
+
 /// A plant, as its author writes it: `dx/dt = f(t, x, u, w; p)`.
 ///
-/// `NX` states, `NU` inputs, `NW` effort channels, `NP` parameters, `NY` outputs. `w[c]` is the
-/// sum of what the effects add on effort channel `c`. Sizes must agree with [`PlantMeta`];
-/// [`declare_plant!`](crate::declare_plant) checks that at compile time.
-pub trait Plant<const NX: usize, const NU: usize, const NW: usize, const NP: usize, const NY: usize>:
-    Sized + Send + Sync + 'static
-{
+/// The lengths of `x`, `u`, `w` and `p` are those of the tables in [`Plant::META`]. An author writes them
+/// as arrays, `x: &[S; 2]`; an array of another length does not compile. `w[c]` is the sum of what the
+/// effects add on effort channel `c`. [`declare_plant!`](crate::declare_plant) does the rest.
+///
+/// ```
+/// use loopsight_core::{
+///     Channel, Parameter, Place, Plant, PlantMeta, Reads, Real, Role, Signal, declare_plant,
+/// };
+///
+/// /// A flywheel that a torque turns: `ω' = (τ + w)/J`.
+/// struct Flywheel;
+///
+/// impl Plant for Flywheel {
+///     const META: PlantMeta = PlantMeta {
+///         id: "flywheel",
+///         summary: "a wheel turned by a torque",
+///         equation: "omega' = (torque + w)/J",
+///         reference: "Newton (1687), second law",
+///         assumptions: "a rigid wheel",
+///         example: "[plant.flywheel]\nJ = 0.02\n",
+///         states: &[Signal::new("speed", "omega", "rad/s", "speed of the wheel")],
+///         inputs: &[Signal::new("torque", "tau", "N m", "torque at the wheel")],
+///         outputs: &[],
+///         integrals: &[],
+///         channels: &[Channel {
+///             id: "shaft",
+///             place: Place::Effort(0),
+///             unit: "N m",
+///             equation: "tau -> tau + w",
+///             reads: &[Reads(Role::Flow, "speed"), Reads(Role::Drive, "torque")],
+///             side: 0,
+///             size: 1.0,
+///             doc: "torques at the wheel",
+///         }],
+///         parameters: &[Parameter::new("J", "J", "kg m^2", "inertia").above(0.0).nonlinear()],
+///         parameterizations: &[],
+///         controlled: &[0],
+///     };
+///
+///     fn derivative<S: Real>(_x: &[S; 1], u: &[S; 1], w: &[S; 1], p: &[S; 1]) -> [S; 1] {
+///         [(u[0] + w[0]) / p[0]]
+///     }
+///
+///     fn output<S: Real>(_index: usize, _x: &[S; 1], _u: &[S; 1], _p: &[S; 1]) -> S {
+///         S::zero()
+///     }
+/// }
+///
+/// declare_plant!(Flywheel, "flywheel");
+///
+/// let rate = <Flywheel as Plant>::derivative(&[0.0], &[0.1], &[-0.02], &[0.02]);
+/// assert!((rate[0] - 4.0f64).abs() < 1e-12);
+/// ```
+pub trait Plant: PlantArrays + Sized + Send + Sync + 'static {
     /// Names, units, channels, parameters, equation, reference.
     const META: PlantMeta;
 
@@ -70,21 +172,31 @@ pub trait Plant<const NX: usize, const NU: usize, const NW: usize, const NP: usi
     const MAX_STEP_S: f64 = MAX_STEP_S;
 
     /// The rate of the state, in the state's units per second.
-    fn derivative<S: Real>(x: &[S; NX], u: &[S; NU], w: &[S; NW], p: &[S; NP]) -> [S; NX];
+    fn derivative<S: Real>(
+        x: &Self::State<S>,
+        u: &Self::Input<S>,
+        w: &Self::Effort<S>,
+        p: &Self::Parameters<S>,
+    ) -> Self::State<S>;
 
     /// The `index`-th of [`PlantMeta::outputs`]; one at a time, since most are not needed.
-    fn output<S: Real>(index: usize, x: &[S; NX], u: &[S; NU], p: &[S; NP]) -> S;
+    fn output<S: Real>(
+        index: usize,
+        x: &Self::State<S>,
+        u: &Self::Input<S>,
+        p: &Self::Parameters<S>,
+    ) -> S;
 
     /// Parameters of the equations from those of [`PlantMeta::parameterizations`]`[set]`.
     ///
     /// `from` has the length of that set. `None` when the set does not exist.
-    fn lower<S: Real>(set: usize, from: &[S]) -> Option<[S; NP]> {
+    fn lower<S: Real>(set: usize, from: &[S]) -> Option<Self::Parameters<S>> {
         let _ = (set, from);
         None
     }
 
     /// The `index`-th of [`Plant::DERIVED`].
-    fn derived<S: Real>(index: usize, p: &[S; NP]) -> S {
+    fn derived<S: Real>(index: usize, p: &Self::Parameters<S>) -> S {
         let _ = (index, p);
         S::zero()
     }
@@ -93,15 +205,22 @@ pub trait Plant<const NX: usize, const NU: usize, const NW: usize, const NP: usi
 /// A plant whose controlled states obey `dy/dt = f(y) + G(y) u + H(y) w`, for controllers that invert
 /// `G`.
 ///
-/// `M` controlled states, `NU` inputs, `NW` effort channels; written for `no_std` code where the
-/// run-time probing of [`Dynamics`] would cost too much.
-pub trait ControlAffine<const M: usize, const NU: usize, const NW: usize, const NP: usize> {
+/// Written for code without `std`, where probing a [`Dynamics`] at run time would cost too much. There are
+/// as many controlled states ([`PlantMeta::controlled`]) as inputs, so `y` has the length of `u`.
+pub trait ControlAffine: Plant {
     /// The drift `f(y)`, in units of the controlled states per second.
-    fn drift<S: Real>(y: &[S; M], p: &[S; NP]) -> [S; M];
+    fn drift<S: Real>(y: &Self::Input<S>, p: &Self::Parameters<S>) -> Self::Input<S>;
     /// The input matrix `G(y)`, row by row.
-    fn input_matrix<S: Real>(y: &[S; M], p: &[S; NP]) -> [[S; NU]; M];
+    fn input_matrix<S: Real>(
+        y: &Self::Input<S>,
+        p: &Self::Parameters<S>,
+    ) -> Self::Input<Self::Input<S>>;
     /// What efforts `w` on the plant's channels add to the rates: `H(y) w`.
-    fn push<S: Real>(y: &[S; M], w: &[S; NW], p: &[S; NP]) -> [S; M];
+    fn push<S: Real>(
+        y: &Self::Input<S>,
+        w: &Self::Effort<S>,
+        p: &Self::Parameters<S>,
+    ) -> Self::Input<S>;
 }
 
 /// The object-safe view of a plant for one scalar, on slices.
@@ -134,56 +253,36 @@ pub trait Dynamics<S: Real>: Send + Sync {
     }
 }
 
-/// Checks the sizes of a plant against its declaration; called by [`declare_plant!`](crate::declare_plant) in a constant.
-pub const fn check_sizes(
-    meta: &PlantMeta,
-    nx: usize,
-    nu: usize,
-    nw: usize,
-    np: usize,
-    ny: usize,
-) -> bool {
-    let mut efforts = 0;
-    let mut i = 0;
-    while i < meta.channels.len() {
-        if let crate::Place::Effort(c) = meta.channels[i].place {
-            if c >= nw {
-                return false;
-            }
-            efforts += 1;
-        }
-        i += 1;
-    }
-    meta.states.len() == nx
-        && meta.inputs.len() == nu
-        && efforts == nw
-        && meta.parameters.len() == np
-        && meta.outputs.len() == ny
-        && (meta.controlled.is_empty() || meta.controlled.len() == nu)
-}
-
 /// Makes a [`Plant`] available behind [`Dynamics`].
+///
+/// The sizes are those of [`Plant::META`]; equations written for others do not compile. Nor does an id
+/// that is not the one in `META`, nor effort channels that are not numbered from 0 without gaps.
 ///
 /// The macro of the same name in `loopsight-model` does this and adds the plant to the registry. A crate
 /// that builds with and without `std` chooses between the two once, in its `lib.rs`.
 ///
-/// ```ignore
-/// declare_plant!(Ddmr, "ddmr", <6, 2, 4, 8, 4>);
-/// ```
+/// [`Plant`] has an example.
 #[macro_export]
 macro_rules! declare_plant {
-    ($plant:ident, $id:literal, <$nx:literal, $nu:literal, $nw:literal, $np:literal, $ny:literal>) => {
-        const _: () = assert!(
-            $crate::plant_check(
-                &<$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::META,
-                $nx,
-                $nu,
-                $nw,
-                $np,
-                $ny
-            ),
-            "the sizes of the plant differ from its PlantMeta"
-        );
+    ($plant:ident, $id:literal) => {
+        const _: () = {
+            let meta = &<$plant as $crate::Plant>::META;
+            assert!(
+                $crate::__private::same_text(meta.id, $id),
+                "the id of the plant differs from that of its PlantMeta"
+            );
+            assert!(
+                meta.is_consistent(),
+                "effort channels are numbered from 0 without gaps, and there are as many controlled states as inputs, or none"
+            );
+        };
+
+        impl $crate::PlantArrays for $plant {
+            type State<T: Copy + Send> = [T; <$plant as $crate::Plant>::META.states.len()];
+            type Input<T: Copy + Send> = [T; <$plant as $crate::Plant>::META.inputs.len()];
+            type Effort<T: Copy + Send> = [T; <$plant as $crate::Plant>::META.efforts()];
+            type Parameters<T: Copy + Send> = [T; <$plant as $crate::Plant>::META.parameters.len()];
+        }
 
         impl<S: $crate::Real> $crate::Dynamics<S> for $plant {
             fn derivative(&self, x: &[S], u: &[S], w: &[S], p: &[S], dx: &mut [S]) {
@@ -192,55 +291,50 @@ macro_rules! declare_plant {
                 else {
                     return;
                 };
-                let rate: [S; $nx] =
-                    <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::derivative(x, u, w, p);
+                let rate = <$plant as $crate::Plant>::derivative::<S>(x, u, w, p);
                 for (to, from) in dx.iter_mut().zip(rate) {
                     *to = from;
                 }
             }
             fn step(&self, x: &mut [S], h: S, u: &[S], w: &[S], p: &[S]) {
-                let (Ok(x), Ok(u), Ok(w), Ok(p)) = (
-                    <&mut [S; $nx]>::try_from(x),
+                let (Some(x), Ok(u), Ok(w), Ok(p)) = (
+                    <<$plant as $crate::PlantArrays>::State<S> as $crate::Array<S>>::from_mut_slice(x),
                     u.try_into(),
                     w.try_into(),
                     p.try_into(),
                 ) else {
                     return;
                 };
-                $crate::rk4_step(x, h, |x| {
-                    <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::derivative(x, u, w, p)
-                });
+                $crate::rk4_step(x, h, |x| <$plant as $crate::Plant>::derivative::<S>(x, u, w, p));
             }
             fn output(&self, index: usize, x: &[S], u: &[S], p: &[S]) -> S {
                 let (Ok(x), Ok(u), Ok(p)) = (x.try_into(), u.try_into(), p.try_into()) else {
                     return S::of(0.0);
                 };
-                <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::output(index, x, u, p)
+                <$plant as $crate::Plant>::output::<S>(index, x, u, p)
             }
             fn lower(&self, set: usize, from: &[S], p: &mut [S]) {
                 if set == 0 {
                     for (to, from) in p.iter_mut().zip(from) {
                         *to = *from;
                     }
-                } else if let Some(lowered) =
-                    <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::lower(set - 1, from)
-                {
+                } else if let Some(lowered) = <$plant as $crate::Plant>::lower(set - 1, from) {
                     for (to, from) in p.iter_mut().zip(lowered) {
                         *to = from;
                     }
                 }
             }
             fn max_step_s(&self) -> f64 {
-                <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::MAX_STEP_S
+                <$plant as $crate::Plant>::MAX_STEP_S
             }
             fn derivable(&self) -> &'static [$crate::Derived] {
-                <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::DERIVED
+                <$plant as $crate::Plant>::DERIVED
             }
             fn derived(&self, index: usize, p: &[S]) -> S {
                 let Ok(p) = p.try_into() else {
                     return S::of(0.0);
                 };
-                <$plant as $crate::Plant<$nx, $nu, $nw, $np, $ny>>::derived(index, p)
+                <$plant as $crate::Plant>::derived::<S>(index, p)
             }
         }
     };

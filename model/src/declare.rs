@@ -4,19 +4,19 @@
 /// registers it: `[plant.<id>]` in TOML.
 ///
 /// ```ignore
-/// declare_plant!(Ddmr, "ddmr", <6, 2, 4, 8, 4>);
+/// declare_plant!(Ddmr, "ddmr");
 /// ```
 #[macro_export]
 macro_rules! declare_plant {
-    ($plant:ident, $id:literal, <$nx:literal, $nu:literal, $nw:literal, $np:literal, $ny:literal>) => {
-        $crate::__private::loopsight_core::declare_plant!($plant, $id, <$nx, $nu, $nw, $np, $ny>);
+    ($plant:ident, $id:literal) => {
+        $crate::__private::loopsight_core::declare_plant!($plant, $id);
 
         const _: () = {
             use $crate::__private::{inventory, serde, typetag};
 
             impl $crate::registry::DeclaredPlant for $plant {
                 const META: &'static $crate::__private::loopsight_core::PlantMeta =
-                    &<$plant as $crate::__private::loopsight_core::Plant<$nx, $nu, $nw, $np, $ny>>::META;
+                    &<$plant as $crate::__private::loopsight_core::Plant>::META;
                 const INSTANCE: &'static dyn $crate::registry::AnyDynamics = &$plant;
             }
 
@@ -51,7 +51,7 @@ macro_rules! declare_plant {
 
             inventory::submit! { $crate::registry::PlantEntry(
                 <$plant as $crate::registry::DeclaredPlant>::META,
-                <$plant as $crate::__private::loopsight_core::Plant<$nx, $nu, $nw, $np, $ny>>::DERIVED,
+                <$plant as $crate::__private::loopsight_core::Plant>::DERIVED,
             ) }
         };
     };
@@ -61,19 +61,19 @@ macro_rules! declare_plant {
 /// registers it: `[effect.<id>]` in an `[[effect]]` of the TOML.
 ///
 /// ```ignore
-/// declare_effect!(CoulombFriction, "coulomb_friction", <2, 0>);
+/// declare_effect!(CoulombFriction, "coulomb_friction");
 /// ```
 #[macro_export]
 macro_rules! declare_effect {
-    ($effect:ident, $id:literal, <$np:literal, $nz:literal>) => {
-        $crate::__private::loopsight_core::declare_effect!($effect, $id, <$np, $nz>);
+    ($effect:ident, $id:literal) => {
+        $crate::__private::loopsight_core::declare_effect!($effect, $id);
 
         const _: () = {
             use $crate::__private::{inventory, serde, typetag};
 
             impl $crate::registry::DeclaredEffect for $effect {
                 const META: &'static $crate::__private::loopsight_core::EffectMeta =
-                    &<$effect as $crate::__private::loopsight_core::Effect<$np, $nz>>::META;
+                    &<$effect as $crate::__private::loopsight_core::Effect>::META;
                 const INSTANCE: &'static dyn $crate::registry::AnyPhysics = &$effect;
             }
 

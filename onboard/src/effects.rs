@@ -1,97 +1,118 @@
-//! The effects that a robot can compensate, by their identifiers.
+//! The effects that are compiled into a firmware.
 
-use loopsight_core::{Effect, EffectMeta, Physics, Reading, Real};
+use loopsight_core::{Array, Effect, EffectMeta, Reading, Real, Role};
 use loopsight_link::PARAMETERS;
-use loopsight_plants::effects::{
-    ConstantForce, CoulombFriction, DirectionalFriction, QuadraticDrag, ScrubFriction,
-    StribeckFriction, ViscousFriction,
-};
 
-/// Writes the effects down once; a `match` instead of a table of functions, so that what a tick evaluates is
-/// compiled into it.
-macro_rules! aboard {
-    ($($effect:ident),+) => {
-        /// An effect that this library has aboard: one of those that act at once, as forces, and read nothing
-        /// but how their channel moves.
-        ///
-        /// There is no registry without `std`, so what a robot knows is written down here.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[non_exhaustive]
-        pub enum Known {
-            $(#[doc = concat!("See [`", stringify!($effect), "`].")] $effect,)+
-        }
+/// A set of effects that a robot can compensate. Written by [`aboard!`](crate::aboard).
+///
+/// There is no registry without `std`, so a firmware lists its effects. The set is an enumeration and its
+/// evaluation a `match`: what a tick evaluates is compiled into it.
+pub trait EffectSet: Copy + Send + Sync + 'static {
+    /// One element per signal that an effect reads; as long as the most that one of them reads.
+    type Reads<T: Copy + Send>: Array<T> + Copy + Send;
 
-        impl Known {
-            /// All of them.
-            const ALL: &[Known] = &[$(Known::$effect),+];
+    /// The effect `id`; `None` where it is not in the set.
+    fn named(id: &str) -> Option<Self>;
 
-            /// What it declares.
-            pub const fn meta(self) -> &'static EffectMeta {
-                match self {
-                    $(Known::$effect => &$effect::META,)+
-                }
-            }
+    /// What it declares.
+    fn meta(self) -> &'static EffectMeta;
 
-            /// What it adds to its channel with the parameters `p`, in the channel's unit. `nominal` and
-            /// `side` are those of a [`Reading`], `signal` is what it reads there, in its order.
-            #[inline(always)]
-            pub(crate) fn contribution<S: Real>(
-                self,
-                nominal: S,
-                side: S,
-                signal: impl Fn(usize) -> S,
-                p: &[S; PARAMETERS],
-            ) -> S {
-                match self {
-                    $(Known::$effect => {
-                        let meta = &$effect::META;
-                        let read: [S; READS] = core::array::from_fn(|k| match meta.reads.get(k) {
-                            Some(_) => signal(k),
-                            None => S::zero(),
-                        });
-                        let nothing = Reading {
-                            nominal,
-                            side,
-                            ..Reading::nothing()
-                        };
-                        let reads = meta.reads.iter().zip(&read);
-                        let reading =
-                            reads.fold(nothing, |at, (role, signal)| at.with(*role, signal));
-                        let p = &p[..meta.parameters.len()];
-                        Physics::contribution(&$effect, &reading, &[], p)
-                    })+
-                }
-            }
-        }
-    };
+    /// What it adds to its channel with the parameters `p`, in the channel's unit.
+    ///
+    /// `nominal` and `side` are those of a [`Reading`]. `signal(k)` is the `k`-th signal that it reads.
+    fn contribution<S: Real>(
+        self,
+        nominal: S,
+        side: S,
+        signal: impl Fn(usize) -> S,
+        p: &[S; PARAMETERS],
+    ) -> S;
 }
 
-aboard!(
-    ConstantForce,
-    CoulombFriction,
-    DirectionalFriction,
-    QuadraticDrag,
-    ScrubFriction,
-    StribeckFriction,
-    ViscousFriction
-);
+/// An effect can be compensated aboard: it acts at once, as a force, and reads speeds only.
+///
+/// It may have no states, no memory, and no more parameters than a message holds.
+pub const fn acts_aboard(meta: &EffectMeta) -> bool {
+    let mut k = 0;
+    while k < meta.reads.len() {
+        if !matches!(meta.reads[k], Role::Flow | Role::Forward | Role::Yaw) {
+            return false;
+        }
+        k += 1;
+    }
+    let mut on_efforts = false;
+    k = 0;
+    while k < meta.places.len() {
+        on_efforts |= matches!(meta.places[k], loopsight_core::PlaceKind::Effort);
+        k += 1;
+    }
+    on_efforts && meta.states == 0 && !meta.memory && meta.parameters.len() <= PARAMETERS
+}
 
-/// Most signals that one of them reads at a channel.
-pub(crate) const READS: usize = {
+/// The most signals that one of these effects reads.
+#[doc(hidden)]
+pub const fn most_reads(metas: &[&EffectMeta]) -> usize {
     let (mut most, mut k) = (0, 0);
-    while k < Known::ALL.len() {
-        let reads = Known::ALL[k].meta().reads.len();
-        if reads > most {
-            most = reads;
+    while k < metas.len() {
+        if metas[k].reads.len() > most {
+            most = metas[k].reads.len();
         }
         k += 1;
     }
     most
-};
+}
 
-impl Known {
-    /// The effect `id`, where it is known aboard.
-    pub fn named(id: &str) -> Option<Self> {
-        (Self::ALL.iter().copied()).find(|known| known.meta().id == id)
+/// What the effect `E` adds to its channel; `A` is [`EffectSet::Reads`].
+#[doc(hidden)]
+#[inline(always)]
+pub fn contribution<E: Effect, S: Real, A: Array<S>>(
+    nominal: S,
+    side: S,
+    signal: impl Fn(usize) -> S,
+    p: &[S; PARAMETERS],
+) -> S {
+    let meta = &E::META;
+    let read = A::from_fn(|k| match meta.reads.get(k) {
+        Some(_) => signal(k),
+        None => S::zero(),
+    });
+    let nothing = Reading {
+        nominal,
+        side,
+        ..Reading::nothing()
+    };
+    let reads = meta.reads.iter().zip(read.as_ref());
+    let reading = reads.fold(nothing, |at, (role, signal)| at.with(*role, signal));
+    match E::Parameters::<S>::from_first(p) {
+        Some(p) => E::contribution(&reading, &E::State::filled(S::zero()), p),
+        None => S::zero(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Parts, Twil};
+    use loopsight_plants::effects::*;
+
+    type Library = <Twil as Parts>::Effects;
+
+    #[test]
+    fn a_set_knows_its_effects_by_their_ids() {
+        let known = Library::named("coulomb_friction").unwrap();
+        assert_eq!(known.meta().id, "coulomb_friction");
+        assert!(Library::named("backlash").is_none());
+    }
+
+    #[test]
+    fn what_has_states_or_a_memory_or_reads_a_position_does_not_act_aboard() {
+        for meta in [
+            &Backlash::META,
+            &InputDelay::META,
+            &TorqueRipple::META,
+            &SensorScale::META,
+        ] {
+            assert!(!acts_aboard(meta), "{}", meta.id);
+        }
     }
 }

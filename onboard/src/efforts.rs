@@ -1,11 +1,11 @@
 //! What the effects of a model add to the efforts of its plant.
 
 use heapless::Vec;
-use loopsight_core::{Place, Plant, Real};
+use loopsight_core::{Array, Place, Plant, Real};
 use loopsight_link::{Attachment, CHANNELS, EFFECTS, PARAMETERS, Unusable};
 
-use crate::Known;
-use crate::effects::READS;
+use crate::effects::EffectSet;
+use crate::parts::{Parts, PerEffort, PerInput, PerParameter, PerState};
 
 /// The effects of a model on the efforts of a plant.
 ///
@@ -18,67 +18,81 @@ use crate::effects::READS;
 ///
 /// | symbol | what |
 /// |---|---|
-/// | `y` | controlled states, `NU` of them |
+/// | `y` | controlled states, as many as the plant has inputs |
 /// | `s` | a signal: one of the controlled states, or an output that is linear in them, as speeds are |
-/// | `c` | how, found by moving each of the states by one; what is learned does not move it |
-#[derive(Clone)]
-pub struct Efforts<S, const NU: usize> {
-    acting: Vec<Acting<S, NU>, { EFFECTS * CHANNELS }>,
+/// | `c` | its row, found by moving each of the states by one; it does not depend on what is learned |
+pub struct Efforts<R: Parts> {
+    acting: Vec<Acting<R>, { EFFECTS * CHANNELS }>,
+}
+
+impl<R: Parts> Clone for Efforts<R> {
+    fn clone(&self) -> Self {
+        Self {
+            acting: self.acting.clone(),
+        }
+    }
 }
 
 /// An effect at one of its channels.
-#[derive(Clone)]
-pub(crate) struct Acting<S, const NU: usize> {
-    known: Known,
+struct Acting<R: Parts> {
+    effect: R::Effects,
     effort: usize,
-    side: S,
+    side: R::Scalar,
     /// `c` of the signals that it reads there, in its order.
-    reads: [[S; NU]; READS],
-    values: [S; PARAMETERS],
+    reads: <R::Effects as EffectSet>::Reads<PerInput<R>>,
+    values: [R::Scalar; PARAMETERS],
 }
 
-impl<S: Real, const NU: usize> Efforts<S, NU> {
+impl<R: Parts> Clone for Acting<R> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<R: Parts> Copy for Acting<R> {}
+
+impl<R: Parts> Efforts<R> {
     /// No effects.
     pub fn none() -> Self {
         Self { acting: Vec::new() }
     }
 
-    /// The effects of a configuration, for the plant `P` with the parameters `p`.
-    pub fn new<P, const NX: usize, const NW: usize, const NP: usize, const NY: usize>(
-        attachments: &[Attachment],
-        p: &[S; NP],
-    ) -> Result<Self, Unusable>
-    where
-        P: Plant<NX, NU, NW, NP, NY>,
-    {
+    /// The effects of a configuration, for a plant with the parameters `p`.
+    ///
+    /// # Errors
+    ///
+    /// The first effect that is not among [`Parts::Effects`], has other values than its parameters, acts on
+    /// something else than efforts, or reads a signal that is not linear in the controlled states.
+    pub fn new(attachments: &[Attachment], p: &PerParameter<R>) -> Result<Self, Unusable> {
         let mut efforts = Self::none();
         for (index, attachment) in attachments.iter().enumerate() {
             let at = index as u8;
-            let known = Known::named(&attachment.id).ok_or(Unusable::Effect(at))?;
-            let meta = known.meta();
+            let effect = R::Effects::named(&attachment.id).ok_or(Unusable::Effect(at))?;
+            let meta = effect.meta();
             let finite = attachment.values.iter().all(|v| v.is_finite());
             if meta.parameters.len() != attachment.values.len() || !finite {
                 return Err(Unusable::Effect(at));
             }
-            let mut values = [S::zero(); PARAMETERS];
+            let mut values = [R::Scalar::of(0.0); PARAMETERS];
             for (to, from) in values.iter_mut().zip(&attachment.values) {
-                *to = S::of(f64::from(*from));
+                *to = R::Scalar::of(f64::from(*from));
             }
             for channel in &attachment.channels {
-                let channel =
-                    (P::META.channels.get(usize::from(*channel))).ok_or(Unusable::Channel(at))?;
+                let channel = R::Plant::META.channels.get(usize::from(*channel));
+                let channel = channel.ok_or(Unusable::Channel(at))?;
                 let Place::Effort(effort) = channel.place else {
                     return Err(Unusable::Channel(at));
                 };
-                let mut reads = [[S::zero(); NU]; READS];
-                for (to, role) in reads.iter_mut().zip(meta.reads) {
+                let mut reads = Array::filled(PerInput::<R>::filled(R::Scalar::of(0.0)));
+                let rows: &mut <R::Effects as EffectSet>::Reads<PerInput<R>> = &mut reads;
+                for (to, role) in rows.as_mut().iter_mut().zip(meta.reads) {
                     let name = channel.read(*role).ok_or(Unusable::Channel(at))?;
-                    *to = signal::<S, P, NX, NU, NW, NP, NY>(name, p).ok_or(Unusable::Reads(at))?;
+                    *to = signal::<R>(name, p).ok_or(Unusable::Reads(at))?;
                 }
                 let acting = Acting {
-                    known,
+                    effect,
                     effort,
-                    side: S::of(f64::from(channel.side)),
+                    side: R::Scalar::of(f64::from(channel.side)),
                     reads,
                     values,
                 };
@@ -91,8 +105,8 @@ impl<S: Real, const NU: usize> Efforts<S, NU> {
 
     /// The efforts where the controlled states are `y`.
     #[inline(always)]
-    pub fn at<const NW: usize>(&self, y: &[S; NU]) -> [S; NW] {
-        let mut w = [S::zero(); NW];
+    pub fn at(&self, y: &PerInput<R>) -> PerEffort<R> {
+        let mut w = PerEffort::<R>::filled(R::Scalar::of(0.0));
         for acting in &self.acting {
             let effort = &mut w[acting.effort];
             *effort += acting.contribution(*effort, y);
@@ -101,69 +115,57 @@ impl<S: Real, const NU: usize> Efforts<S, NU> {
     }
 }
 
-impl<S: Real, const NU: usize> Acting<S, NU> {
-    /// What it adds to an effort that is `nominal` without it. On its own: within a tick its constants would
-    /// be loaded, and what they displace saved, before it is known which effect it is.
+impl<R: Parts> Acting<R> {
+    /// What it adds to an effort that is `nominal` without it. A function of its own: inlined into a tick,
+    /// its constants would be loaded before it is known which effect it is.
     #[inline(never)]
-    fn contribution(&self, nominal: S, y: &[S; NU]) -> S {
+    fn contribution(&self, nominal: R::Scalar, y: &PerInput<R>) -> R::Scalar {
         let signal = |k: usize| {
-            let products = self.reads[k].iter().zip(y).map(|(c, y)| *c * *y);
+            let row = self.reads[k].as_ref().iter();
+            let products = row.zip(y.as_ref()).map(|(c, y)| *c * *y);
             products
                 .reduce(|sum, product| sum + product)
-                .unwrap_or(S::zero())
+                .unwrap_or(R::Scalar::of(0.0))
         };
-        (self.known).contribution(nominal, self.side, signal, &self.values)
+        (self.effect).contribution(nominal, self.side, signal, &self.values)
     }
 }
 
-/// `c` of the signal `name`, where it is linear in the controlled states alone: everything else is not known
+/// `c` of the signal `name`, where it is linear in the controlled states alone. Everything else is not known
 /// aboard. Found by moving them and the rest, in the plant's own equations.
-fn signal<
-    S,
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
->(
-    name: &str,
-    p: &[S; NP],
-) -> Option<[S; NU]>
-where
-    S: Real,
-    P: Plant<NX, NU, NW, NP, NY>,
-{
-    let controlled = P::META.controlled;
-    let unit = |i: usize| core::array::from_fn(|k| if k == i { S::one() } else { S::zero() });
-    if let Some(state) = P::META.states.iter().position(|s| s.id == name) {
+fn signal<R: Parts>(name: &str, p: &PerParameter<R>) -> Option<PerInput<R>> {
+    let of = R::Scalar::of;
+    let meta = &R::Plant::META;
+    let controlled = meta.controlled;
+    let unit = |i: usize| PerInput::<R>::from_fn(|k| of(if k == i { 1.0 } else { 0.0 }));
+    if let Some(state) = meta.states.iter().position(|s| s.id == name) {
         return controlled.iter().position(|i| *i == state).map(unit);
     }
-    let index = P::META.outputs.iter().position(|s| s.id == name)?;
-    let output = |y: &[S; NU], rest: f64, p: &[S; NP]| {
-        let mut x = [S::of(rest); NX];
-        for (i, y) in controlled.iter().zip(y) {
+    let index = meta.outputs.iter().position(|s| s.id == name)?;
+    let output = |y: &PerInput<R>, rest: f64, p: &PerParameter<R>| {
+        let mut x = PerState::<R>::filled(of(rest));
+        for (i, y) in controlled.iter().zip(y.as_ref()) {
             x[*i] = *y;
         }
-        P::output(index, &x, &[S::of(rest); NU], p)
+        R::Plant::output(index, &x, &PerInput::<R>::filled(of(rest)), p)
     };
-    let of = |p: &[S; NP]| core::array::from_fn(|i| output(&unit(i), 0.0, p));
-    let c: [S; NU] = of(p);
+    let row = |p: &PerParameter<R>| PerInput::<R>::from_fn(|i| output(&unit(i), 0.0, p));
+    let c = row(p);
     let mut others = *p;
-    for (value, parameter) in others.iter_mut().zip(P::META.parameters) {
+    for (value, parameter) in others.as_mut().iter_mut().zip(meta.parameters) {
         if parameter.linear {
-            *value = *value * S::of(1.7) + S::one();
+            *value = *value * of(1.7) + R::Scalar::of(1.0);
         }
     }
     let linear = [[0.3, -1.1], [-2.3, 0.7], [0.0, 0.0]].iter().all(|pair| {
-        let y: [S; NU] = core::array::from_fn(|i| S::of(pair[i % 2] * (1 + i / 2) as f64));
-        let products = || c.iter().zip(&y).map(|(c, y)| *c * *y);
-        let sum = products().fold(S::zero(), |sum, product| sum + product);
-        let size = products().fold(S::zero(), |sum, product| sum + product.abs());
+        let y = PerInput::<R>::from_fn(|i| of(pair[i % 2] * (1 + i / 2) as f64));
+        let products = || c.as_ref().iter().zip(y.as_ref()).map(|(c, y)| *c * *y);
+        let sum = products().fold(R::Scalar::of(0.0), |sum, product| sum + product);
+        let size = products().fold(R::Scalar::of(0.0), |sum, product| sum + product.abs());
         [0.0, 1.0, -0.6].iter().all(|rest| {
             let off = (output(&y, *rest, p) - sum).abs();
-            off <= S::of(1e-5) * size
+            off <= of(1e-5) * size
         })
     });
-    (linear && of(&others) == c).then_some(c)
+    (linear && row(&others).as_ref() == c.as_ref()).then_some(c)
 }

@@ -1,15 +1,15 @@
 //! Learning aboard: one guarded estimator per controlled state.
 
-use core::marker::PhantomData;
-
 use heapless::Vec;
-use loopsight_core::learning::{Guarded, Guards, Lesson, Range, Withheld};
-use loopsight_core::{AffineModel, ControlAffine, Innovation, Observation, Observer, Plant, Real};
-use loopsight_estimators::{Rls, RlsSettings};
-use loopsight_link::{Learning, Unusable};
-use nalgebra::{Const, SVector};
+use loopsight_core::learning::{Guards, Lesson, Range, Withheld};
+use loopsight_core::{
+    AffineModel, Array, ControlAffine, Innovation, Observation, Observer, Plant, Real,
+};
+use loopsight_link::{Learning, PARAMETERS, Unusable};
 
 use crate::Efforts;
+use crate::estimator::RowEstimator;
+use crate::parts::{Parts, PerEffort, PerInput, PerParameter, PerRow};
 
 /// One recursive estimator per controlled state, fed with the plant's own equations.
 ///
@@ -31,239 +31,191 @@ use crate::Efforts;
 /// a host takes Simpson's rule over the same line. They differ by a twelfth of the second difference of a
 /// quadratic regressor, `(Δω)²/12` of `ω²`, and by nothing in linear ones.
 ///
-/// Each parameter belongs to the one row whose rate it moves, `R` of them to each. Effects are known
-/// aboard, not learned.
+/// Each parameter belongs to the one row whose rate it moves; each row has as many as the estimator
+/// estimates. Effects are known aboard, not learned.
 ///
 /// Reference: Alves, Lages, Henriques (2018), (38)–(47); Hairer, Lubich, Wanner (2006), "Geometric Numerical
 /// Integration", II.1 (midpoint rule).
-pub struct Learner<
-    S: Real,
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
-> {
-    rows: [Row<S, R>; NU],
-    values: [S; NP],
+pub struct Learner<R: Parts> {
+    rows: <PerInput<R> as Array<R::Scalar>>::Of<Row<R>>,
+    values: PerParameter<R>,
     /// What is learned is zero, the rest as it is known.
-    base: [S; NP],
+    base: PerParameter<R>,
     /// The same with the `k`-th parameter of every row at one: no parameter moves the rate of another row
     /// than its own, so one of each is tried at a time.
-    probes: [[S; NP]; R],
-    efforts: Efforts<S, NU>,
-    rate: S,
+    probes: PerRow<R, PerParameter<R>>,
+    efforts: Efforts<R>,
+    rate: R::Scalar,
     means: bool,
     certainty_equivalence: bool,
-    before: Option<[S; NU]>,
-    input: Option<[S; NU]>,
-    plant: PhantomData<P>,
+    before: Option<PerInput<R>>,
+    input: Option<PerInput<R>>,
 }
 
-struct Row<S: Real, const R: usize> {
-    estimator: Guarded<S, Rls<S, Const<R>>, Const<R>>,
-    parameters: [usize; R],
-    lesson: Lesson<S>,
+struct Row<R: Parts> {
+    estimator: R::Estimator,
+    parameters: PerRow<R, usize>,
+    lesson: Lesson<R::Scalar>,
 }
 
 /// `r(p)` at `y` with the inputs `u` and the efforts `w`.
 #[inline]
-fn rates<
-    S,
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
->(
-    y: &[S; NU],
-    u: &[S; NU],
-    w: &[S; NW],
-    p: &[S; NP],
-) -> [S; NU]
-where
-    S: Real,
-    P: Plant<NX, NU, NW, NP, NY> + ControlAffine<NU, NU, NW, NP>,
-{
+fn rates<P: ControlAffine, S: Real>(
+    y: &P::Input<S>,
+    u: &P::Input<S>,
+    w: &P::Effort<S>,
+    p: &P::Parameters<S>,
+) -> P::Input<S> {
     let (f, push, g) = (P::drift(y, p), P::push(y, w, p), P::input_matrix(y, p));
-    core::array::from_fn(|i| {
-        let drives = g[i].iter().zip(u).map(|(g, u)| *g * *u);
+    P::Input::from_fn(|i| {
+        let drives = g[i].into_iter().zip(u.as_ref()).map(|(g, u)| g * *u);
         drives.fold(f[i] + push[i], |sum, drive| sum + drive)
     })
 }
 
-impl<
-    S,
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
-> Learner<S, P, NX, NU, NW, NP, NY, R>
-where
-    S: Real,
-    P: Plant<NX, NU, NW, NP, NY> + ControlAffine<NU, NU, NW, NP>,
-{
+impl<R: Parts> Learner<R> {
     /// Learns from `values` on, `period` in s.
+    ///
+    /// # Errors
+    ///
+    /// Settings of other lengths than the plant's, or that the estimator does not take; a plant whose
+    /// parameters do not belong to one row each, as many to each row as the estimator has.
     pub fn new(
         settings: &Learning,
-        values: [S; NP],
-        efforts: Efforts<S, NU>,
+        values: PerParameter<R>,
+        efforts: Efforts<R>,
         means: bool,
         period: f64,
     ) -> Result<Self, Unusable> {
         let lists = [&settings.low, &settings.high, &settings.scale];
-        let sized = lists.iter().all(|l| l.len() == NP)
-            && settings.dead_zone.len() == NU
-            && settings.least_excitation.len() == NU;
+        let sized = (lists.iter()).all(|l| l.len() == PerParameter::<R>::LENGTH)
+            && settings.dead_zone.len() == PerInput::<R>::LENGTH
+            && settings.least_excitation.len() == PerInput::<R>::LENGTH;
         if !sized {
             return Err(Unusable::Learning);
         }
-        let rls = RlsSettings {
-            forgetting: settings.forgetting,
-            initial_covariance: settings.initial_covariance,
-            covariance_limit: Some(settings.covariance_limit),
-            ..RlsSettings::default()
-        };
-        let wide = |v: &f32| f64::from(*v);
+        let mut wrong = Unusable::Plant;
+        let rows = (0..PerInput::<R>::LENGTH)
+            .map_while(|i| Row::new(settings, &values, i).map_err(|w| wrong = w).ok());
+        let rows = <PerInput<R> as Array<R::Scalar>>::Of::<Row<R>>::collect(rows).ok_or(wrong)?;
         let mut base = values;
-        let mut rows: Vec<Row<S, R>, NU> = Vec::new();
-        for i in 0..NU {
-            let parameters = parameters_of::<P, NX, NU, NW, NP, NY, R>(i).ok_or(Unusable::Plant)?;
-            let ranges = parameters.map(|j| Range {
-                low: S::of(wide(&settings.low[j])),
-                high: S::of(wide(&settings.high[j])),
-                scale: S::of(wide(&settings.scale[j])),
-            });
-            let guards = Guards {
-                dead_zone: wide(&settings.dead_zone[i]),
-                least_excitation: wide(&settings.least_excitation[i]),
-                window: settings.window,
-            };
-            let start = parameters.map(|j| values[j]);
-            let estimator = Rls::new(SVector::zeros(), &rls).map_err(|_| Unusable::Learning)?;
-            let estimator = Guarded::new(estimator, SVector::from(start), &ranges, guards)
-                .ok_or(Unusable::Learning)?;
-            for j in parameters {
-                base[j] = S::zero();
-            }
-            let row = Row {
-                estimator,
-                parameters,
-                lesson: Lesson::none(Withheld::NoRegressor),
-            };
-            rows.push(row).map_err(|_| Unusable::Plant)?;
-        }
-        let rows = rows.into_array().map_err(|_| Unusable::Plant)?;
-        let mut probes = [base; R];
-        for (k, probe) in probes.iter_mut().enumerate() {
-            for row in &rows {
-                probe[row.parameters[k]] = S::one();
+        for row in rows.as_ref() {
+            for j in row.parameters {
+                base[j] = R::Scalar::of(0.0);
             }
         }
+        let probes = PerRow::<R, _>::from_fn(|k| {
+            let mut probe = base;
+            for row in rows.as_ref() {
+                probe[row.parameters[k]] = R::Scalar::of(1.0);
+            }
+            probe
+        });
         Ok(Self {
             rows,
             probes,
             values,
             base,
             efforts,
-            rate: S::of(1.0 / period),
+            rate: R::Scalar::of(1.0 / period),
             means,
             certainty_equivalence: settings.certainty_equivalence,
             before: None,
             input: None,
-            plant: PhantomData,
         })
     }
 
     /// The plant's parameters: the learned ones as they are estimated, the others as they were.
-    pub fn values(&self) -> &[S; NP] {
+    pub fn values(&self) -> &PerParameter<R> {
         &self.values
     }
 
     /// Rows that the last tick taught, one bit each.
     pub fn learned(&self) -> u8 {
-        (self.rows.iter().enumerate())
+        (self.rows.as_ref().iter().enumerate())
             .filter(|(_, row)| row.lesson.withheld.is_none())
             .fold(0, |bits, (i, _)| bits | 1 << i)
     }
 
-    fn learn(&mut self, before: &[S; NU], now: &[S; NU], u: &[S; NU], why: Option<Withheld>) {
-        let half = S::of(0.5);
-        let middle: [S; NU] = core::array::from_fn(|i| half * (before[i] + now[i]));
+    fn learn(
+        &mut self,
+        before: &PerInput<R>,
+        now: &PerInput<R>,
+        u: &PerInput<R>,
+        why: Option<Withheld>,
+    ) {
+        let half = R::Scalar::of(0.5);
+        let middle = PerInput::<R>::from_fn(|i| half * (before[i] + now[i]));
         let w = self.efforts.at(&middle);
-        let rate = |p: &[S; NP]| rates::<S, P, NX, NU, NW, NP, NY>(&middle, u, &w, p);
+        let rate = |p: &PerParameter<R>| rates::<R::Plant, R::Scalar>(&middle, u, &w, p);
         let zero = rate(&self.base);
-        let moved: [[S; NU]; R] = core::array::from_fn(|k| rate(&self.probes[k]));
-        for (i, row) in self.rows.iter_mut().enumerate() {
-            let phi: [S; R] = core::array::from_fn(|k| moved[k][i] - zero[i]);
+        let moved = PerRow::<R, PerInput<R>>::from_fn(|k| rate(&self.probes[k]));
+        for (i, row) in self.rows.as_mut().iter_mut().enumerate() {
+            let phi = PerRow::<R>::from_fn(|k| moved[k][i] - zero[i]);
             let y = (now[i] - before[i]) * self.rate - zero[i];
-            row.lesson = row.estimator.update(&phi, y, why);
-            for (j, value) in row.parameters.iter().zip(row.estimator.theta()) {
+            row.lesson = row.estimator.update(phi.as_ref(), y, why);
+            for (j, value) in row.parameters.as_ref().iter().zip(row.estimator.theta()) {
                 self.values[*j] = *value;
             }
         }
     }
 }
 
+impl<R: Parts> Row<R> {
+    fn new(settings: &Learning, values: &PerParameter<R>, i: usize) -> Result<Self, Unusable> {
+        let wide = |v: &f32| f64::from(*v);
+        let parameters = parameters_of::<R>(i).ok_or(Unusable::Plant)?;
+        let ranges = PerRow::<R, _>::from_fn(|k| {
+            let j = parameters[k];
+            Range {
+                low: R::Scalar::of(wide(&settings.low[j])),
+                high: R::Scalar::of(wide(&settings.high[j])),
+                scale: R::Scalar::of(wide(&settings.scale[j])),
+            }
+        });
+        let guards = Guards {
+            dead_zone: wide(&settings.dead_zone[i]),
+            least_excitation: wide(&settings.least_excitation[i]),
+            window: settings.window,
+        };
+        let start = PerRow::<R>::from_fn(|k| values[parameters[k]]);
+        let estimator = R::Estimator::new(settings, start, &ranges, guards);
+        Ok(Self {
+            estimator: estimator.ok_or(Unusable::Learning)?,
+            parameters,
+            lesson: Lesson::none(Withheld::NoRegressor),
+        })
+    }
+}
+
 /// The parameters that move the rate of the `row`-th controlled state and no other; `None` where these are
-/// not `R`. Tried at a point without symmetry, like a host does.
-fn parameters_of<
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
->(
-    row: usize,
-) -> Option<[usize; R]>
-where
-    P: Plant<NX, NU, NW, NP, NY> + ControlAffine<NU, NU, NW, NP>,
-{
-    let y = core::array::from_fn(|i| 0.37 + 0.21 * i as f64);
-    let u = core::array::from_fn(|i| 1.3 - 0.7 * i as f64);
-    let zero = [0.0; NP];
-    let rest = rates::<f64, P, NX, NU, NW, NP, NY>(&y, &u, &[0.0; NW], &zero);
-    let mut found: Vec<usize, R> = Vec::new();
-    for (j, parameter) in P::META.parameters.iter().enumerate() {
+/// not as many as the estimator has. Tried at a point without symmetry, as a host does.
+fn parameters_of<R: Parts>(row: usize) -> Option<PerRow<R, usize>> {
+    let y = PerInput::<R, f64>::from_fn(|i| 0.37 + 0.21 * i as f64);
+    let u = PerInput::<R, f64>::from_fn(|i| 1.3 - 0.7 * i as f64);
+    let w = PerEffort::<R, f64>::filled(0.0);
+    let zero = PerParameter::<R, f64>::filled(0.0);
+    let rest = rates::<R::Plant, f64>(&y, &u, &w, &zero);
+    let mut found: Vec<usize, PARAMETERS> = Vec::new();
+    for (j, parameter) in R::Plant::META.parameters.iter().enumerate() {
         let mut p = zero;
         p[j] = 1.0;
-        let moved = rates::<f64, P, NX, NU, NW, NP, NY>(&y, &u, &[0.0; NW], &p);
+        let moved = rates::<R::Plant, f64>(&y, &u, &w, &p);
         let moves = |i: usize| moved[i] != rest[i];
         if parameter.linear && moves(row) {
-            if (0..NU).any(|i| i != row && moves(i)) {
+            if (0..PerInput::<R>::LENGTH).any(|i| i != row && moves(i)) {
                 return None;
             }
             found.push(j).ok()?;
         }
     }
-    found.into_array().ok()
+    Array::collect(found)
 }
 
-impl<
-    S,
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
-> Observer<S> for Learner<S, P, NX, NU, NW, NP, NY, R>
-where
-    S: Real,
-    P: Plant<NX, NU, NW, NP, NY> + ControlAffine<NU, NU, NW, NP>,
-{
-    fn observe(&mut self, seen: &Observation<'_, S>) {
-        let now = <[S; NU]>::try_from(seen.measured).ok();
-        let applied = <[S; NU]>::try_from(seen.applied).ok();
+impl<R: Parts> Observer<R::Scalar> for Learner<R> {
+    fn observe(&mut self, seen: &Observation<'_, R::Scalar>) {
+        let now = PerInput::<R>::from_slice(seen.measured).copied();
+        let applied = PerInput::<R>::from_slice(seen.applied).copied();
         let earlier = core::mem::replace(&mut self.input, applied);
         let withheld = Withheld::by(&seen.sample, seen.outcome, false);
         let usable = seen.sample.fresh && seen.measured.iter().all(|v| v.is_finite());
@@ -271,8 +223,8 @@ where
         // A mean over a period is reached by the inputs of that period and of the one before.
         let input = match (self.means, applied, earlier) {
             (true, Some(now), Some(earlier)) => {
-                let half = S::of(0.5);
-                Some(core::array::from_fn(|i| half * (now[i] + earlier[i])))
+                let half = R::Scalar::of(0.5);
+                Some(PerInput::<R>::from_fn(|i| half * (now[i] + earlier[i])))
             }
             (true, ..) => None,
             (false, now, _) => now,
@@ -286,28 +238,29 @@ where
         } else {
             Withheld::Stale
         };
-        for row in &mut self.rows {
+        for row in self.rows.as_mut() {
             row.lesson = Lesson::none(why);
         }
     }
 
-    fn teach(&self, model: &mut dyn AffineModel<S>) {
+    fn teach(&self, model: &mut dyn AffineModel<R::Scalar>) {
         if self.certainty_equivalence {
-            model.learn_all(&self.values);
+            model.learn_all(self.values.as_ref());
         }
     }
 
-    fn innovation(&self, row: usize) -> Option<Innovation<S>> {
-        self.rows.get(row)?.lesson.innovation()
+    fn innovation(&self, row: usize) -> Option<Innovation<R::Scalar>> {
+        self.rows.as_ref().get(row)?.lesson.innovation()
     }
 
-    fn restart(&mut self, values: &[S]) {
-        for row in &mut self.rows {
-            let start = row
-                .parameters
-                .map(|j| values.get(j).copied().unwrap_or(S::zero()));
-            row.estimator.reset(&start);
-            for (j, value) in row.parameters.iter().zip(row.estimator.theta()) {
+    fn restart(&mut self, values: &[R::Scalar]) {
+        for row in self.rows.as_mut() {
+            let start = PerRow::<R>::from_fn(|k| {
+                let value = values.get(row.parameters[k]);
+                value.copied().unwrap_or(R::Scalar::of(0.0))
+            });
+            row.estimator.reset(start.as_ref());
+            for (j, value) in row.parameters.as_ref().iter().zip(row.estimator.theta()) {
                 self.values[*j] = *value;
             }
         }

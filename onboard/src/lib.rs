@@ -19,28 +19,42 @@
 
 #![cfg_attr(not(feature = "std"), no_std)]
 
+mod affine_plant;
 mod effects;
 mod efforts;
+mod estimator;
 #[cfg(feature = "std")]
 mod host;
+mod law;
 mod learner;
-mod model;
+mod parts;
 mod port;
 mod robot;
 mod session;
 mod watch;
 
-pub use effects::Known;
+pub use affine_plant::AffinePlant;
+pub use effects::{EffectSet, acts_aboard};
 pub use efforts::Efforts;
+pub use estimator::{OnboardEstimator, RowEstimator};
 #[cfg(feature = "std")]
 pub use host::{Aboard, Acknowledged, Line, LineError, SafetySettings, SendError, Serial, send};
+pub use law::OnboardLaw;
 pub use learner::Learner;
 pub use loopsight_link::Attachment;
-pub use model::Model;
+pub use parts::{Parts, PerEffort, PerInput, PerParameter, PerRow, PerState, Twil};
 pub use port::{Port, Prompted};
-pub use robot::Robot;
+pub use robot::{Done, Robot};
 pub use session::{Meter, Sensors, Session};
 
-/// The conversation of a Twil: a differential drive with two motors, whose equations have three parameters in
-/// each row, measuring its forward speed and yaw rate.
-pub type Twil<M> = Session<loopsight_plants::Ddmr, M, 6, 2, 4, 8, 12, 3>;
+/// What [`aboard!`] needs.
+#[doc(hidden)]
+pub mod __private {
+    pub use crate::effects::{contribution, most_reads};
+    pub use loopsight_controllers::FeedbackLinearizingPi;
+    pub use loopsight_core::learning::Guarded;
+    pub use loopsight_core::{Effect, EffectMeta, Plant, Real};
+    pub use loopsight_link::PARAMETERS;
+    pub use loopsight_plants::effects;
+    pub use nalgebra::Const;
+}

@@ -1,39 +1,40 @@
 //! What stands between a loop aboard and its robot: values put in, values taken out.
 
-use loopsight_core::{Clock, Driver, DriverFault, Real, Sample};
+use loopsight_core::{Array, Clock, Driver, DriverFault, Real, Sample};
 
 /// A driver whose measurements are put in before a tick, and whose inputs are taken out after it.
 ///
-/// What is not finite is refused, what the supply cannot give is cut; at rest its inputs are zero.
+/// Commands that are not finite are refused, and what the supply cannot give is cut off. At rest the inputs
+/// are zero. `A` is the array `[S; N]`.
 #[derive(Clone, Debug)]
-pub struct Port<S, const N: usize> {
+pub struct Port<S, A> {
     /// What the next tick measures.
-    pub measured: [S; N],
+    pub measured: A,
     /// The measurement is young enough to learn from.
     pub fresh: bool,
     /// Largest magnitude of an input that the supply can give.
     pub most: S,
     /// What the last tick applied.
-    pub applied: [S; N],
+    pub applied: A,
 }
 
-impl<S: Real, const N: usize> Default for Port<S, N> {
+impl<S: Real, A: Array<S>> Default for Port<S, A> {
     fn default() -> Self {
         Self {
-            measured: [S::of(f64::NAN); N],
+            measured: A::filled(S::of(f64::NAN)),
             fresh: false,
             most: S::of(f64::INFINITY),
-            applied: [S::zero(); N],
+            applied: A::filled(S::zero()),
         }
     }
 }
 
-impl<S: Real, const N: usize> Driver<S> for Port<S, N> {
+impl<S: Real, A: Array<S> + Send> Driver<S> for Port<S, A> {
     type Error = DriverFault;
 
     fn read(&mut self, measured: &mut [S]) -> Result<Sample<S>, DriverFault> {
-        for (to, from) in measured.iter_mut().zip(self.measured) {
-            *to = from;
+        for (to, from) in measured.iter_mut().zip(self.measured.as_ref()) {
+            *to = *from;
         }
         // Times are those of the host: aboard, one period follows the other.
         Ok(Sample {
@@ -46,7 +47,8 @@ impl<S: Real, const N: usize> Driver<S> for Port<S, N> {
         if command.iter().any(|v| !v.is_finite()) {
             return Err(DriverFault::Rejected);
         }
-        for ((own, to), from) in self.applied.iter_mut().zip(applied).zip(command) {
+        let own = self.applied.as_mut().iter_mut();
+        for ((own, to), from) in own.zip(applied).zip(command) {
             *own = from.held(-self.most, self.most);
             *to = *own;
         }
@@ -54,7 +56,7 @@ impl<S: Real, const N: usize> Driver<S> for Port<S, N> {
     }
 
     fn safe_stop(&mut self) -> Result<(), DriverFault> {
-        self.applied = [S::zero(); N];
+        self.applied = A::filled(S::zero());
         Ok(())
     }
 }

@@ -1,82 +1,49 @@
 //! The loop of a configuration.
 
-use loopsight_controllers::FeedbackLinearizingPi;
-use loopsight_core::{Command, ControlAffine, Loop, Plant};
+use loopsight_core::{Array, Command, Loop, Plant};
 use loopsight_link::{Configuration, ControllerGains, Unusable};
-use nalgebra::{Const, SVector};
 
-use crate::{Efforts, Learner, Model, Port, Prompted};
+use crate::law::OnboardLaw;
+use crate::parts::{Parts, PerInput, PerParameter};
+use crate::{AffinePlant, Efforts, Learner, Port, Prompted};
 
 /// A loop in fixed sizes, as a configuration says.
-pub struct Robot<
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
-> {
-    inner: Inner<P, NX, NU, NW, NP, NY, R>,
+pub struct Robot<R: Parts> {
+    inner: Inner<R>,
     gains: ControllerGains,
-    parameters: [f32; NP],
+    parameters: PerParameter<R>,
 }
 
-type Inner<
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
-> = Loop<
-    f32,
-    Port<f32, NU>,
-    FeedbackLinearizingPi<f32, Const<NU>>,
-    Model<f32, P, NX, NU, NW, NP, NY>,
-    Option<Learner<f32, P, NX, NU, NW, NP, NY, R>>,
+type Inner<R> = Loop<
+    <R as Parts>::Scalar,
+    Port<<R as Parts>::Scalar, PerInput<R>>,
+    <R as Parts>::Law,
+    AffinePlant<R>,
+    Option<Learner<R>>,
     Prompted,
-    [f32; NU],
+    PerInput<R>,
 >;
 
-/// What one tick came to.
+/// What one tick came to; `A` is the array `[f32; N]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Done<const NU: usize> {
+pub struct Done<A> {
     /// What the motors get.
-    pub applied: [f32; NU],
+    pub applied: A,
     /// What the control law says of it.
     pub outcome: Command,
 }
 
-impl<
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
-> Robot<P, NX, NU, NW, NP, NY, R>
-where
-    P: Plant<NX, NU, NW, NP, NY> + ControlAffine<NU, NU, NW, NP>,
-{
+impl<R: Parts<Scalar = f32>> Robot<R> {
     /// The loop of `configuration`, `period` in s.
+    ///
+    /// # Errors
+    ///
+    /// What of the configuration is not for these [`Parts`], or cannot be used.
     pub fn new(configuration: &Configuration, period: f64) -> Result<Self, Unusable> {
         let (model, learner, parameters) = parts(configuration, period)?;
         let gains = &configuration.controller;
-        let vector = |list: &[f64]| {
-            let list = <[f64; NU]>::try_from(list).map_err(|_| Unusable::Controller)?;
-            Ok(SVector::from(list))
-        };
-        let controller = FeedbackLinearizingPi::new(
-            &vector(&gains.proportional)?,
-            &vector(&gains.integral)?,
-            &vector(&gains.limit)?,
-            period,
-        )
-        .map_err(|_| Unusable::Controller)?;
-        let zero = [0.0; NU];
+        let controller = R::Law::new(gains, period).ok_or(Unusable::Controller)?;
+        let zero = PerInput::<R>::filled(0.0);
         let inner = Loop::new(
             Port::default(),
             controller,
@@ -111,10 +78,10 @@ where
     /// One tick. `None` where there is no command: then the motors are at rest.
     pub fn tick(
         &mut self,
-        measured: [f32; NU],
+        measured: PerInput<R>,
         fresh: bool,
         reference: &[f32],
-    ) -> Option<Done<NU>> {
+    ) -> Option<Done<PerInput<R>>> {
         self.inner.driver.measured = measured;
         self.inner.driver.fresh = fresh;
         let outcome = self.inner.tick(reference).ok()?.outcome;
@@ -130,12 +97,12 @@ where
     }
 
     /// What the motors get.
-    pub fn applied(&self) -> &[f32; NU] {
+    pub fn applied(&self) -> &PerInput<R> {
         &self.inner.driver.applied
     }
 
     /// The plant's parameters, the learned ones as they are estimated.
-    pub fn parameters(&self) -> &[f32; NP] {
+    pub fn parameters(&self) -> &PerParameter<R> {
         match &self.inner.observer {
             Some(learner) => learner.values(),
             None => &self.parameters,
@@ -148,52 +115,25 @@ where
     }
 }
 
-type Parts<
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
-> = (
-    Model<f32, P, NX, NU, NW, NP, NY>,
-    Option<Learner<f32, P, NX, NU, NW, NP, NY, R>>,
-    [f32; NP],
-);
-
-fn parts<
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
->(
+/// Model and learning of a configuration, and the parameters that both start from.
+fn parts<R: Parts<Scalar = f32>>(
     configuration: &Configuration,
     period: f64,
-) -> Result<Parts<P, NX, NU, NW, NP, NY, R>, Unusable>
-where
-    P: Plant<NX, NU, NW, NP, NY> + ControlAffine<NU, NU, NW, NP>,
-{
-    if configuration.plant != P::META.id {
+) -> Result<(AffinePlant<R>, Option<Learner<R>>, PerParameter<R>), Unusable> {
+    let meta = &R::Plant::META;
+    if configuration.plant != meta.id {
         return Err(Unusable::Plant);
     }
-    let parameters = <[f32; NP]>::try_from(configuration.parameters.as_slice())
-        .ok()
+    let parameters = *PerParameter::<R>::from_slice(&configuration.parameters)
         .filter(|p| {
-            let declared = P::META.parameters.iter().zip(p);
-            declared
-                .clone()
-                .all(|(d, v)| v.is_finite() && d.admits(f64::from(*v)))
+            let mut declared = meta.parameters.iter().zip(p.as_ref());
+            declared.all(|(d, v)| v.is_finite() && d.admits(f64::from(*v)))
         })
         .ok_or(Unusable::Parameters)?;
-    let bands = <[f32; NU]>::try_from(configuration.bands.as_slice())
-        .ok()
-        .filter(|b| b.iter().all(|v| v.is_finite() && *v >= 0.0))
+    let bands = *PerInput::<R>::from_slice(&configuration.bands)
+        .filter(|b| b.as_ref().iter().all(|v| v.is_finite() && *v >= 0.0))
         .ok_or(Unusable::Controller)?;
-    let efforts = Efforts::new::<P, NX, NW, NP, NY>(&configuration.effects, &parameters)?;
+    let efforts = Efforts::new(&configuration.effects, &parameters)?;
     let learner = (configuration.learning.as_ref())
         .map(|learning| {
             Learner::new(
@@ -205,5 +145,6 @@ where
             )
         })
         .transpose()?;
-    Ok((Model::new(parameters, efforts, bands), learner, parameters))
+    let model = AffinePlant::new(parameters, efforts, bands);
+    Ok((model, learner, parameters))
 }

@@ -1,12 +1,13 @@
 //! The conversation of a robot with its host.
 
-use loopsight_core::{ControlAffine, Plant};
+use loopsight_core::{Array, Plant};
 use loopsight_link::{
     Act, Configuration, Decoder, Hello, Measured, Note, PARAMETERS, Reason, Reply, Request,
     SIGNALS, Sensed, Unusable, VERSION, Welcome,
 };
 
 use crate::Robot;
+use crate::parts::{Parts, PerInput, PerParameter};
 use crate::watch::Watch;
 
 /// Tells what a tick costs, in a unit of the board's own.
@@ -25,11 +26,11 @@ impl Meter for () {
     }
 }
 
-/// What a robot's own sensors say, once per period.
+/// What a robot's own sensors say, once per period; `A` is the array `[f32; N]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sensors<const NU: usize> {
+pub struct Sensors<A> {
     /// The controlled states.
-    pub measured: [f32; NU],
+    pub measured: A,
     /// Voltage of the supply, V.
     pub supply: f32,
 }
@@ -48,64 +49,34 @@ pub struct Sensors<const NU: usize> {
 /// * messages of another session, or steps that do not follow one another: one side was started anew;
 /// * measurements that are too old, are no numbers, or do not move while the motors are driven;
 /// * a supply that sags.
-pub struct Session<
-    P,
-    M,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
-> {
+pub struct Session<R: Parts, M> {
     meter: M,
     period_us: u32,
     decoder: Decoder,
     own_sensors: bool,
     session: u32,
     greeted: bool,
-    run: Option<Run<P, NX, NU, NW, NP, NY, R>>,
+    run: Option<Run<R>>,
     tick: u32,
     dropped: u32,
     cost: u32,
 }
 
-struct Run<
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
-> {
-    robot: Robot<P, NX, NU, NW, NP, NY, R>,
-    watch: Watch<NU>,
+struct Run<R: Parts> {
+    robot: Robot<R>,
+    watch: Watch,
     /// A step has come since the configuration.
     begun: bool,
     /// The reference of the last step, for a robot with sensors of its own.
-    wanted: [f32; NU],
+    wanted: PerInput<R>,
 }
 
-impl<
-    P,
-    M,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-    const R: usize,
-> Session<P, M, NX, NU, NW, NP, NY, R>
-where
-    P: Plant<NX, NU, NW, NP, NY> + ControlAffine<NU, NU, NW, NP>,
-    M: Meter,
-{
+impl<R: Parts<Scalar = f32>, M: Meter> Session<R, M> {
     /// A robot that was just switched on.
     pub fn new(period_us: u32, meter: M) -> Self {
         const {
             assert!(
-                NU <= SIGNALS && NP <= PARAMETERS,
+                PerInput::<R>::LENGTH <= SIGNALS && PerParameter::<R>::LENGTH <= PARAMETERS,
                 "a message does not hold this plant"
             );
         }
@@ -136,7 +107,7 @@ where
     }
 
     /// What the motors get; `None`: they are at rest.
-    pub fn output(&self) -> Option<&[f32; NU]> {
+    pub fn output(&self) -> Option<&PerInput<R>> {
         self.run
             .as_ref()
             .filter(|run| run.begun)
@@ -155,7 +126,7 @@ where
 
     /// A period of the board's timer has gone by: what its sensors say, or `None` where motors or sensors
     /// failed.
-    pub fn sensed(&mut self, sensors: Option<Sensors<NU>>, say: &mut dyn FnMut(&Reply)) {
+    pub fn sensed(&mut self, sensors: Option<Sensors<PerInput<R>>>, say: &mut dyn FnMut(&Reply)) {
         self.elapsed(say);
         if self.run.as_ref().is_none_or(|run| !run.begun) {
             return;
@@ -170,19 +141,23 @@ where
     }
 
     /// A tick by the board's own timer.
-    fn go(&mut self, sensors: &Sensors<NU>, say: &mut dyn FnMut(&Reply)) -> Result<(), Reason> {
+    fn go(
+        &mut self,
+        sensors: &Sensors<PerInput<R>>,
+        say: &mut dyn FnMut(&Reply),
+    ) -> Result<(), Reason> {
         let run = self.run.as_mut().ok_or(Reason::NotConfigured)?;
         let fresh = run.watch.measured(0, sensors.supply)?;
         // A bridge gives no more than its supply, and the law, what is learned and the log must know.
-        if P::META.inputs.iter().all(|input| input.unit == "V") {
+        if R::Plant::META.inputs.iter().all(|input| input.unit == "V") {
             run.robot.give_at_most(sensors.supply.max(0.0));
         }
         let wanted = run.wanted;
         let mut act = self.act(sensors.measured, fresh, &wanted)?;
         act.sensed = Some(Sensed {
             supply: sensors.supply,
-            measured: sensors.measured.iter().copied().collect(),
-            reference: wanted.iter().copied().collect(),
+            measured: sensors.measured.into_iter().collect(),
+            reference: wanted.into_iter().collect(),
         });
         say(&Reply::Act(act));
         Ok(())
@@ -241,7 +216,7 @@ where
         self.tick = 0;
         let mut plant = heapless::String::new();
         // An identifier that is too long for a message is one that no host asks for.
-        let _ = plant.push_str(P::META.id);
+        let _ = plant.push_str(R::Plant::META.id);
         say(&Reply::Hello(Welcome {
             hello: Hello {
                 version: VERSION,
@@ -265,7 +240,7 @@ where
     ) -> Result<(), Reason> {
         let period = self.period();
         let unusable = |what: Unusable| Reason::Configuration(what);
-        let watch = Watch::new::<P, NX, NW, NP, NY>(&configuration.safety).map_err(unusable)?;
+        let watch = Watch::new::<R::Plant>(&configuration.safety).map_err(unusable)?;
         match self.run.as_mut().filter(|run| run.begun) {
             Some(run) => {
                 run.robot.improve(configuration, period).map_err(unusable)?;
@@ -276,7 +251,7 @@ where
                     robot: Robot::new(configuration, period).map_err(unusable)?,
                     watch,
                     begun: false,
-                    wanted: [0.0; NU],
+                    wanted: PerInput::<R>::filled(0.0),
                 });
                 self.tick = 0;
             }
@@ -290,9 +265,9 @@ where
     fn step(&mut self, step: &Measured, say: &mut dyn FnMut(&Reply)) -> Result<(), Reason> {
         let own_sensors = self.own_sensors;
         let run = self.run.as_mut().ok_or(Reason::NotConfigured)?;
-        let reference = <[f32; NU]>::try_from(step.reference.as_slice()).ok();
-        let reference = reference.filter(|r| r.iter().all(|v| v.is_finite()));
-        let reference = reference.ok_or(Reason::NotFinite)?;
+        let reference = PerInput::<R>::from_slice(&step.reference);
+        let reference = reference.filter(|r| r.as_ref().iter().all(|v| v.is_finite()));
+        let reference = *reference.ok_or(Reason::NotFinite)?;
         match (own_sensors, step.measured.is_empty()) {
             (true, true) => {
                 run.watch.heard();
@@ -310,8 +285,8 @@ where
         }
         run.watch.heard();
         let fresh = run.watch.measured(step.age_us, step.supply)?;
-        let measured = <[f32; NU]>::try_from(step.measured.as_slice());
-        let act = self.act(measured.map_err(|_| Reason::NotFinite)?, fresh, &reference)?;
+        let measured = PerInput::<R>::from_slice(&step.measured).copied();
+        let act = self.act(measured.ok_or(Reason::NotFinite)?, fresh, &reference)?;
         say(&Reply::Act(act));
         Ok(())
     }
@@ -321,19 +296,19 @@ where
     #[inline(never)]
     fn act(
         &mut self,
-        measured: [f32; NU],
+        measured: PerInput<R>,
         fresh: bool,
-        reference: &[f32; NU],
+        reference: &PerInput<R>,
     ) -> Result<Act, Reason> {
         let run = self.run.as_mut().ok_or(Reason::NotConfigured)?;
-        if !measured.iter().all(|v| v.is_finite()) {
+        if !measured.as_ref().iter().all(|v| v.is_finite()) {
             return Err(Reason::NotFinite);
         }
         let (applied, parameters) = (run.robot.applied(), run.robot.parameters());
         run.watch
-            .turned::<P, NX, NW, NP, NY>(applied, &measured, parameters)?;
+            .turned::<R::Plant>(applied, &measured, parameters)?;
         self.meter.start();
-        let done = run.robot.tick(measured, fresh, reference);
+        let done = run.robot.tick(measured, fresh, reference.as_ref());
         let cost = core::mem::replace(&mut self.cost, self.meter.stop());
         let done = done.ok_or(Reason::NoCommand)?;
         run.begun = true;
@@ -342,8 +317,8 @@ where
         Ok(Act {
             session: self.session,
             tick,
-            command: done.applied.iter().copied().collect(),
-            parameters: run.robot.parameters().iter().copied().collect(),
+            command: done.applied.into_iter().collect(),
+            parameters: run.robot.parameters().into_iter().collect(),
             saturated: done.outcome.saturated,
             held: done.outcome.held,
             learned: run.robot.learned(),

@@ -1,35 +1,30 @@
 //! What a robot watches over by itself, message or none.
 
 use heapless::Vec;
-use loopsight_core::{Place, Plant, Role};
+use loopsight_core::{Array, Place, Plant, Role};
 use loopsight_link::{Reason, SIGNALS, Safety, Unusable};
 
 /// Speed of a shaft, in its unit, below which its encoder counts nothing.
 const STILL: f32 = 1e-6;
 
 /// Counts what must not last.
-pub(crate) struct Watch<const NU: usize> {
+pub(crate) struct Watch {
     safety: Safety,
     quiet: u16,
     stale: u16,
     still: [u16; SIGNALS],
-    wheels: Vec<Wheel, SIGNALS>,
+    shafts: Vec<Shaft, SIGNALS>,
 }
 
 /// A motor and its encoder: which input drives which of the plant's outputs.
 #[derive(Clone, Copy)]
-struct Wheel {
+struct Shaft {
     input: usize,
     output: usize,
 }
 
-impl<const NU: usize> Watch<NU> {
-    pub(crate) fn new<P, const NX: usize, const NW: usize, const NP: usize, const NY: usize>(
-        safety: &Safety,
-    ) -> Result<Self, Unusable>
-    where
-        P: Plant<NX, NU, NW, NP, NY>,
-    {
+impl Watch {
+    pub(crate) fn new<P: Plant>(safety: &Safety) -> Result<Self, Unusable> {
         let usable = safety.watchdog_ticks > 0
             && safety.stale_ticks > 0
             && safety.encoder_ticks > 0
@@ -38,7 +33,7 @@ impl<const NU: usize> Watch<NU> {
         if !usable {
             return Err(Unusable::Safety);
         }
-        let mut wheels = Vec::new();
+        let mut shafts = Vec::new();
         for channel in P::META.channels {
             let (Place::Effort(_), Some(drive), Some(flow)) = (
                 channel.place,
@@ -50,8 +45,8 @@ impl<const NU: usize> Watch<NU> {
             let input = P::META.inputs.iter().position(|s| s.id == drive);
             let output = P::META.outputs.iter().position(|s| s.id == flow);
             if let (Some(input), Some(output)) = (input, output) {
-                let wheel = Wheel { input, output };
-                wheels.push(wheel).map_err(|_| Unusable::Plant)?;
+                let shaft = Shaft { input, output };
+                shafts.push(shaft).map_err(|_| Unusable::Plant)?;
             }
         }
         Ok(Self {
@@ -59,7 +54,7 @@ impl<const NU: usize> Watch<NU> {
             quiet: 0,
             stale: 0,
             still: [0; SIGNALS],
-            wheels,
+            shafts,
         })
     }
 
@@ -95,25 +90,22 @@ impl<const NU: usize> Watch<NU> {
     }
 
     /// Compares what the motors got with what their encoders say of it.
-    pub(crate) fn turned<P, const NX: usize, const NW: usize, const NP: usize, const NY: usize>(
+    pub(crate) fn turned<P: Plant>(
         &mut self,
-        applied: &[f32; NU],
-        y: &[f32; NU],
-        p: &[f32; NP],
-    ) -> Result<(), Reason>
-    where
-        P: Plant<NX, NU, NW, NP, NY>,
-    {
-        let mut x = [0.0; NX];
-        for (state, value) in P::META.controlled.iter().zip(y) {
+        applied: &P::Input<f32>,
+        y: &P::Input<f32>,
+        p: &P::Parameters<f32>,
+    ) -> Result<(), Reason> {
+        let mut x = P::State::<f32>::filled(0.0);
+        for (state, value) in P::META.controlled.iter().zip(y.as_ref()) {
             x[*state] = *value;
         }
-        for (wheel, still) in self.wheels.iter().zip(&mut self.still) {
-            let driven = applied[wheel.input].abs() > self.safety.encoder_input;
-            let turns = P::output(wheel.output, &x, applied, p).abs() > STILL;
+        for (shaft, still) in self.shafts.iter().zip(&mut self.still) {
+            let driven = applied[shaft.input].abs() > self.safety.encoder_input;
+            let turns = P::output(shaft.output, &x, applied, p).abs() > STILL;
             *still = if driven && !turns { *still + 1 } else { 0 };
             if *still >= self.safety.encoder_ticks {
-                return Err(Reason::EncoderLost(wheel.input as u8));
+                return Err(Reason::EncoderLost(shaft.input as u8));
             }
         }
         Ok(())

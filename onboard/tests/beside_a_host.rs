@@ -5,13 +5,15 @@
 mod twil;
 
 use loopsight_core::{AffineModel, Command, Observation, Observer, Sample, Tick};
+use loopsight_estimators::Rls;
 use loopsight_estimators::RlsSettings;
 use loopsight_link::{Attachment, Unusable};
 use loopsight_model::identification::{Identification, LearningSettings};
 use loopsight_model::model::Model;
 use loopsight_model::regression::Scheme;
-use loopsight_onboard::{Efforts, Learner};
+use loopsight_onboard::{AffinePlant, Efforts, Learner, Twil, aboard};
 use loopsight_plants::Ddmr;
+use nalgebra::Const;
 use twil::*;
 
 const FILE: &str = r#"
@@ -62,8 +64,18 @@ fn attachments() -> [Attachment; 2] {
     ]
 }
 
-fn efforts() -> Efforts<f64, 2> {
-    Efforts::new::<Ddmr, 6, 4, 8, 12>(&attachments(), &TRUE).unwrap()
+aboard! {
+    /// The Twil in the numbers of a host.
+    struct Wide {
+        scalar: f64,
+        plant: Ddmr,
+        effects: library,
+        estimator: Rls<f64, Const<3>>,
+    }
+}
+
+fn efforts() -> Efforts<Wide> {
+    Efforts::new(&attachments(), &TRUE).unwrap()
 }
 
 /// Places and aims without symmetry, at rest and near it, too.
@@ -85,8 +97,7 @@ fn a_control_law_sees_the_same_model() {
     // Friction aboard has the digits of a message.
     let bands = [0, 1].map(|i| host.bands()[i]);
     assert!(bands.iter().all(|b| *b > 0.0), "{bands:?}");
-    let mut aboard =
-        loopsight_onboard::Model::<f64, Ddmr, 6, 2, 4, 8, 12>::new(TRUE, efforts(), bands);
+    let mut aboard = AffinePlant::<Wide>::new(TRUE, efforts(), bands);
     let mut pushed = 0;
     for (y, r) in places() {
         let (mut f, mut g) = ([[0.0; 2]; 2], [[0.0; 4]; 2]);
@@ -130,9 +141,7 @@ fn the_same_is_learned() {
     };
     let start = BELIEVED.map(f64::from);
     host.restart(&[&start[..], &[0.9, 0.3, 0.4]].concat());
-    let mut aboard =
-        Learner::<f64, Ddmr, 6, 2, 4, 8, 12, 3>::new(&learning, start, efforts(), false, 0.01)
-            .unwrap();
+    let mut aboard = Learner::<Wide>::new(&learning, start, efforts(), false, 0.01).unwrap();
     let mut body = Body::default();
     let mut state = 1u32;
     for index in 0..4000 {
@@ -186,7 +195,7 @@ fn what_cannot_be_compensated_is_refused() {
             channels: list(channels),
             values: list(values),
         };
-        Efforts::<f32, 2>::new::<Ddmr, 6, 4, 8, 12>(&[attachment], &BELIEVED).err()
+        Efforts::<Twil>::new(&[attachment], &BELIEVED).err()
     };
     assert_eq!(refused("coulomb_friction", &[0], &[0.9, 0.1]), None);
     assert_eq!(refused("scrub_friction", &[3], &[0.9, 0.1]), None);

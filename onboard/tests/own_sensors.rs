@@ -5,14 +5,14 @@
 mod twil;
 
 use loopsight_link::*;
-use loopsight_onboard::{Sensors, Twil};
+use loopsight_onboard::{Sensors, Session, Twil};
 use twil::*;
 
 const SESSION: u32 = 0x5eed;
 
 /// A robot by its own timer; what it says.
 struct Own {
-    robot: Twil<()>,
+    robot: Session<Twil, ()>,
     body: Body,
     measured: [f32; 2],
     supply: f32,
@@ -22,7 +22,7 @@ impl Own {
     /// Greeted and configured.
     fn new() -> Self {
         let mut own = Self {
-            robot: Twil::with_sensors(PERIOD_US, ()),
+            robot: Session::with_sensors(PERIOD_US, ()),
             body: Body::default(),
             measured: [0.0; 2],
             supply: 12.0,
@@ -49,7 +49,7 @@ impl Own {
         self.hear(&Request::Step(step))
     }
 
-    fn period(&mut self, sensors: Option<Sensors<2>>) -> Vec<Reply> {
+    fn period(&mut self, sensors: Option<Sensors<[f32; 2]>>) -> Vec<Reply> {
         let mut said = Vec::new();
         self.robot
             .sensed(sensors, &mut |reply| said.push(reply.clone()));

@@ -10,7 +10,7 @@ mod twil;
 
 use board::Board;
 use loopsight_link::*;
-use loopsight_onboard::{Sensors, Twil};
+use loopsight_onboard::{Sensors, Session, Twil};
 use twil::*;
 
 const SESSION: u32 = 0x7173;
@@ -24,7 +24,7 @@ fn wanted(tick: u32) -> Request {
 }
 
 /// A desk that measures what the board says it measured; what it does of it.
-fn twin_of(twin: &mut Twil<()>, act: &Act) -> Act {
+fn twin_of(twin: &mut Session<Twil, ()>, act: &Act) -> Act {
     let sensed = act.sensed.clone().unwrap();
     let mut step = step(SESSION, act.tick, [0.0; 2]);
     step.measured.clear();
@@ -50,7 +50,7 @@ fn twin_of(twin: &mut Twil<()>, act: &Act) -> Act {
 #[ignore = "needs qemu-system-arm and the firmware, named by LOOPSIGHT_FIRMWARE_BODY"]
 fn a_board_that_ticks_by_itself_does_what_the_desk_does() {
     let mut board = Board::with("LOOPSIGHT_FIRMWARE_BODY");
-    let mut twin = Twil::with_sensors(PERIOD_US, ());
+    let mut twin = Session::with_sensors(PERIOD_US, ());
     let mut configuration = configuration();
     // This machine may be busy with other things.
     configuration.safety.watchdog_ticks = 200;

@@ -133,7 +133,7 @@ const CHANNELS: [Channel; 6] = [
     AXIS[3],
 ];
 
-impl Plant<2, 1, 2, 4, 4> for Arm {
+impl Plant for Arm {
     const META: PlantMeta = PlantMeta {
         id: "arm",
         summary: "one joint with gravity, driven by a DC motor",
@@ -218,7 +218,7 @@ fn gravity<S: Real>(x: &[S; 2], p: &[S; 4]) -> S {
     -p[2] * (x[1] - p[3]).cos()
 }
 
-declare_plant!(Arm, "arm", <2, 1, 2, 4, 4>);
+declare_plant!(Arm, "arm");
 
 #[cfg(test)]
 mod tests {

@@ -219,7 +219,7 @@ const CHANNELS: [Channel; 9] = [
     },
 ];
 
-impl Plant<4, 1, 2, 4, 0> for CartPole {
+impl Plant for CartPole {
     const META: PlantMeta = PlantMeta {
         id: "cart_pole",
         summary: "a pole that turns freely on a cart: inverted pendulum or crane",
@@ -292,7 +292,7 @@ impl Plant<4, 1, 2, 4, 0> for CartPole {
     }
 }
 
-declare_plant!(CartPole, "cart_pole", <4, 1, 2, 4, 0>);
+declare_plant!(CartPole, "cart_pole");
 
 #[cfg(test)]
 mod tests {

@@ -144,7 +144,7 @@ const CHANNELS: [Channel; 8] = [
     },
 ];
 
-impl Plant<2, 1, 2, 3, 5> for DcAxis {
+impl Plant for DcAxis {
     const META: PlantMeta = PlantMeta {
         id: "dc_axis",
         summary: "an axis driven by one DC motor, rotary or linear",
@@ -207,7 +207,7 @@ impl Plant<2, 1, 2, 3, 5> for DcAxis {
     }
 }
 
-impl ControlAffine<1, 1, 2, 3> for DcAxis {
+impl ControlAffine for DcAxis {
     fn drift<S: Real>(y: &[S; 1], p: &[S; 3]) -> [S; 1] {
         [p[0] * y[0]]
     }
@@ -219,7 +219,7 @@ impl ControlAffine<1, 1, 2, 3> for DcAxis {
     }
 }
 
-declare_plant!(DcAxis, "dc_axis", <2, 1, 2, 3, 5>);
+declare_plant!(DcAxis, "dc_axis");
 
 #[cfg(test)]
 mod tests {

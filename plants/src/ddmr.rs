@@ -105,7 +105,7 @@ impl Ddmr {
     }
 }
 
-impl Plant<6, 2, 4, 8, 12> for Ddmr {
+impl Plant for Ddmr {
     const META: PlantMeta = PlantMeta {
         id: "ddmr",
         summary: "differential-drive mobile robot with two DC motors",
@@ -208,7 +208,7 @@ fn quotient<S: Real>(a: S, b: S) -> S {
 }
 
 /// `u' = -f2(u) + G2 V`, (27)–(29): the drift is `-f2`, the input matrix `G2`.
-impl ControlAffine<2, 2, 4, 8> for Ddmr {
+impl ControlAffine for Ddmr {
     fn drift<S: Real>(y: &[S; 2], p: &[S; 8]) -> [S; 2] {
         let [v, omega] = *y;
         let [k_a, k_b, _, k_d, k_e, ..] = *p;
@@ -227,7 +227,7 @@ impl ControlAffine<2, 2, 4, 8> for Ddmr {
     }
 }
 
-declare_plant!(Ddmr, "ddmr", <6, 2, 4, 8, 12>);
+declare_plant!(Ddmr, "ddmr");
 
 #[cfg(test)]
 mod tests {

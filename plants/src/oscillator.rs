@@ -126,7 +126,7 @@ const CHANNELS: [Channel; 5] = [
     },
 ];
 
-impl Plant<2, 1, 1, 3, 0> for Oscillator {
+impl Plant for Oscillator {
     const META: PlantMeta = PlantMeta {
         id: "oscillator",
         summary: "a mass on a spring with a damper, driven by a force",
@@ -196,7 +196,7 @@ impl Plant<2, 1, 1, 3, 0> for Oscillator {
     }
 }
 
-impl ControlAffine<1, 1, 1, 3> for Oscillator {
+impl ControlAffine for Oscillator {
     fn drift<S: Real>(y: &[S; 1], p: &[S; 3]) -> [S; 1] {
         [-p[1] * y[0]]
     }
@@ -208,7 +208,7 @@ impl ControlAffine<1, 1, 1, 3> for Oscillator {
     }
 }
 
-declare_plant!(Oscillator, "oscillator", <2, 1, 1, 3, 0>);
+declare_plant!(Oscillator, "oscillator");
 
 #[cfg(test)]
 mod tests {

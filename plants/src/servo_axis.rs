@@ -195,7 +195,7 @@ const CHANNELS: [Channel; 8] = [
     ),
 ];
 
-impl Plant<4, 2, 1, 8, 2> for ServoAxis {
+impl Plant for ServoAxis {
     const META: PlantMeta = PlantMeta {
         id: "servo_axis",
         summary: "a slide whose position is controlled, seen through its loop",
@@ -294,7 +294,7 @@ fn voltage<S: Real>(x: &[S; 4], u: &[S; 2], p: &[S; 8]) -> S {
     (k_v * (k_p * (u[0] - x[0]) - x[2]) + u[1]).held(-limit, limit)
 }
 
-declare_plant!(ServoAxis, "servo_axis", <4, 2, 1, 8, 2>);
+declare_plant!(ServoAxis, "servo_axis");
 
 #[cfg(test)]
 mod tests {

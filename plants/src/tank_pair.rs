@@ -189,7 +189,7 @@ const CHANNELS: [Channel; 7] = [
     },
 ];
 
-impl Plant<2, 1, 4, 4, 2> for TankPair {
+impl Plant for TankPair {
     const META: PlantMeta = PlantMeta {
         id: "tank_pair",
         summary: "two tanks in cascade, the upper one filled by a pump",
@@ -287,7 +287,7 @@ fn torricelli<S: Real>(head: S) -> S {
     S::of(2.0 * GRAVITY).sqrt() * head / smooth
 }
 
-declare_plant!(TankPair, "tank_pair", <2, 1, 4, 4, 2>);
+declare_plant!(TankPair, "tank_pair");
 
 #[cfg(test)]
 mod tests {

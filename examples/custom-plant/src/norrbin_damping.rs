@@ -23,8 +23,7 @@ use loopsight_model::declare_effect;
 #[derive(Clone, Copy, Debug)]
 pub struct NorrbinDamping;
 
-// 1 parameter, no states.
-impl Effect<1, 0> for NorrbinDamping {
+impl Effect for NorrbinDamping {
     const META: EffectMeta = EffectMeta {
         id: "norrbin_damping",
         summary: "damping of a hull that grows with the cube of the yaw rate",
@@ -51,7 +50,7 @@ impl Effect<1, 0> for NorrbinDamping {
     }
 }
 
-declare_effect!(NorrbinDamping, "norrbin_damping", <1, 0>);
+declare_effect!(NorrbinDamping, "norrbin_damping");
 
 #[cfg(test)]
 mod tests {

@@ -108,8 +108,7 @@ const CHANNELS: [Channel; 5] = [
     },
 ];
 
-// 2 states, 1 input, 1 effort channel, 2 parameters, no further signals.
-impl Plant<2, 1, 1, 2, 0> for ShipHeading {
+impl Plant for ShipHeading {
     const META: PlantMeta = PlantMeta {
         id: "ship_heading",
         summary: "a ship at constant speed, steered with its rudder",
@@ -152,7 +151,7 @@ impl Plant<2, 1, 1, 2, 0> for ShipHeading {
     }
 }
 
-declare_plant!(ShipHeading, "ship_heading", <2, 1, 1, 2, 0>);
+declare_plant!(ShipHeading, "ship_heading");
 
 #[cfg(test)]
 mod tests {

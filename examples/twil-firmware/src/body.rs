@@ -27,7 +27,7 @@ pub struct Body {
 
 impl Body {
     /// What encoders and supply say, after a period.
-    pub fn sensors(&mut self) -> Sensors<2> {
+    pub fn sensors(&mut self) -> Sensors<[f32; 2]> {
         let period = PERIOD_US as f32 * 1e-6;
         let per_turn = COUNTS / core::f32::consts::TAU;
         let mut wheel = [0.0; 2];

@@ -16,7 +16,7 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::entry;
 use loopsight_link::{LONGEST, Note, Reply, encode};
-use loopsight_onboard::Twil;
+use loopsight_onboard::{Session, Twil};
 
 /// Period of the loop, µs.
 const PERIOD_US: u32 = 10_000;
@@ -37,9 +37,9 @@ fn main() -> ! {
     #[cfg(feature = "body")]
     let mut body = body::Body::default();
     #[cfg(feature = "body")]
-    let mut robot = Twil::with_sensors(PERIOD_US, meter);
+    let mut robot = Session::<Twil, _>::with_sensors(PERIOD_US, meter);
     #[cfg(not(feature = "body"))]
-    let mut robot = Twil::new(PERIOD_US, meter);
+    let mut robot = Session::<Twil, _>::new(PERIOD_US, meter);
     say(&Reply::Log(Note::Started));
     loop {
         while let Some(byte) = mps2::received() {

@@ -10,7 +10,7 @@ use loopsight_model::registry::BuildError;
 use nalgebra::DVector;
 
 use super::Aboard;
-use crate::Known;
+use crate::acts_aboard;
 
 /// An error at a key of a table within `[controller.aboard]`.
 fn within(table: &str, error: BuildError) -> BuildError {
@@ -158,8 +158,10 @@ fn attachment(
         BuildError::at("", format!("the effect `{id}` of the model {what}"))
             .help("leave it out of the model that the robot is told, or run the law on the host")
     };
-    let known = Known::named(id).ok_or_else(|| wrong("is not known aboard"))?;
-    let meta = known.meta();
+    let meta = attached.meta;
+    if !acts_aboard(meta) {
+        return Err(wrong("is not known aboard"));
+    }
     let mut channels = Vec::new();
     for channel in &attached.at {
         let at = plant.channels.iter().position(|c| c.id == channel.id);

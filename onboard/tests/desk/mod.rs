@@ -15,14 +15,14 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use loopsight_link::{Decoder, LONGEST, Reply, Request, encode};
-use loopsight_onboard::{Sensors, Twil};
+use loopsight_onboard::{Sensors, Session, Twil};
 use serialport::{SerialPort, TTYPort};
 
 use crate::twil::{Body, PERIOD_US};
 
 /// What is at the end of a line.
 pub(crate) struct Desk {
-    pub(crate) robot: Twil<()>,
+    pub(crate) robot: Session<Twil, ()>,
     /// Motors and encoders, where the robot has its own.
     body: Option<Body>,
     measured: [f32; 2],
@@ -40,28 +40,28 @@ pub(crate) struct Desk {
 impl Desk {
     /// A robot that its host measures.
     pub(crate) fn measured() -> Self {
-        Self::new(Twil::new(PERIOD_US, ()), None)
+        Self::new(Session::new(PERIOD_US, ()), None)
     }
 
     /// A robot with motors and encoders of its own.
     pub(crate) fn with_body() -> Self {
-        Self::new(Twil::with_sensors(PERIOD_US, ()), Some(Body::default()))
+        Self::new(Session::with_sensors(PERIOD_US, ()), Some(Body::default()))
     }
 
     /// The same with other friction at its wheels: level in V, and speed of its smoothed sign, rad/s.
     pub(crate) fn with_friction(friction: [f64; 2]) -> Self {
         let mut body = Body::default();
         body.friction = friction;
-        Self::new(Twil::with_sensors(PERIOD_US, ()), Some(body))
+        Self::new(Session::with_sensors(PERIOD_US, ()), Some(body))
     }
 
     /// A robot with a body, built for another period.
     pub(crate) fn of_period(period_us: u32) -> Self {
-        let robot = Twil::with_sensors(period_us, ());
+        let robot = Session::with_sensors(period_us, ());
         Self::new(robot, Some(Body::default()))
     }
 
-    fn new(robot: Twil<()>, body: Option<Body>) -> Self {
+    fn new(robot: Session<Twil, ()>, body: Option<Body>) -> Self {
         Self {
             robot,
             body,

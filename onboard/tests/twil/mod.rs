@@ -9,7 +9,7 @@
 use heapless::Vec;
 use loopsight_core::{Physics, Plant, Reading, Role, rk4_step};
 use loopsight_link::*;
-use loopsight_onboard::Twil;
+use loopsight_onboard::{Session, Twil};
 use loopsight_plants::Ddmr;
 use loopsight_plants::effects::CoulombFriction;
 
@@ -133,13 +133,13 @@ fn rubbing(flow: f64, friction: &[f64; 2]) -> f64 {
 
 /// A robot on the other end of a line that is a function call.
 pub(crate) struct Line {
-    pub(crate) robot: Twil<()>,
+    pub(crate) robot: Session<Twil, ()>,
 }
 
 impl Default for Line {
     fn default() -> Self {
         Self {
-            robot: Twil::new(PERIOD_US, ()),
+            robot: Session::new(PERIOD_US, ()),
         }
     }
 }

@@ -31,7 +31,7 @@ use super::first_order;
 #[derive(Clone, Copy, Debug)]
 pub struct ActuatorLag;
 
-impl Effect<1, 1> for ActuatorLag {
+impl Effect for ActuatorLag {
     const META: EffectMeta = EffectMeta {
         id: "actuator_lag",
         summary: "the command takes effect gradually, like through a low-pass filter",
@@ -63,7 +63,7 @@ impl Effect<1, 1> for ActuatorLag {
     }
 }
 
-declare_effect!(ActuatorLag, "actuator_lag", <1, 1>);
+declare_effect!(ActuatorLag, "actuator_lag");
 
 #[cfg(test)]
 mod tests {

@@ -42,7 +42,7 @@ use super::first_order;
 #[derive(Clone, Copy, Debug)]
 pub struct Backlash;
 
-impl Effect<3, 4> for Backlash {
+impl Effect for Backlash {
     const META: EffectMeta = EffectMeta {
         id: "backlash",
         summary: "play between motor and load: after a reversal the motor drives nothing for a while, then strikes",
@@ -131,7 +131,7 @@ impl Effect<3, 4> for Backlash {
     }
 }
 
-declare_effect!(Backlash, "backlash", <3, 4>);
+declare_effect!(Backlash, "backlash");
 
 /// `z` beyond the gap, zero within; by the play it has its derivative at zero too.
 fn engaged<S: Real>(z: S, play: S) -> S {

@@ -31,7 +31,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct BatterySag;
 
-impl Effect<1, 0> for BatterySag {
+impl Effect for BatterySag {
     const META: EffectMeta = EffectMeta {
         id: "battery_sag",
         summary: "the supply falls with the total current, and every command with it",
@@ -66,7 +66,7 @@ impl Effect<1, 0> for BatterySag {
     }
 }
 
-declare_effect!(BatterySag, "battery_sag", <1, 0>);
+declare_effect!(BatterySag, "battery_sag");
 
 #[cfg(test)]
 mod tests {

@@ -26,7 +26,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct CentrifugalOffset;
 
-impl Effect<2, 0> for CentrifugalOffset {
+impl Effect for CentrifugalOffset {
     const META: EffectMeta = EffectMeta {
         id: "centrifugal_offset",
         summary: "the centre of mass off the axle: turning pushes forward, driving resists turning",
@@ -68,7 +68,7 @@ impl Effect<2, 0> for CentrifugalOffset {
     }
 }
 
-declare_effect!(CentrifugalOffset, "centrifugal_offset", <2, 0>);
+declare_effect!(CentrifugalOffset, "centrifugal_offset");
 
 #[cfg(test)]
 mod tests {

@@ -21,7 +21,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct ConstantForce;
 
-impl Effect<1, 0> for ConstantForce {
+impl Effect for ConstantForce {
     const META: EffectMeta = EffectMeta {
         id: "constant_force",
         summary: "a force that is always the same, e.g. gravity on a lift",
@@ -45,7 +45,7 @@ impl Effect<1, 0> for ConstantForce {
     }
 }
 
-declare_effect!(ConstantForce, "constant_force", <1, 0>);
+declare_effect!(ConstantForce, "constant_force");
 
 #[cfg(test)]
 mod tests {

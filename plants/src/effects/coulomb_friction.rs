@@ -27,7 +27,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct CoulombFriction;
 
-impl Effect<2, 0> for CoulombFriction {
+impl Effect for CoulombFriction {
     const META: EffectMeta = EffectMeta {
         id: "coulomb_friction",
         summary: "constant force opposing the motion",
@@ -66,7 +66,7 @@ impl Effect<2, 0> for CoulombFriction {
     }
 }
 
-declare_effect!(CoulombFriction, "coulomb_friction", <2, 0>);
+declare_effect!(CoulombFriction, "coulomb_friction");
 
 #[cfg(test)]
 mod tests {

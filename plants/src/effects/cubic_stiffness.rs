@@ -23,7 +23,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct CubicStiffness;
 
-impl Effect<2, 0> for CubicStiffness {
+impl Effect for CubicStiffness {
     const META: EffectMeta = EffectMeta {
         id: "cubic_stiffness",
         summary: "a spring that hardens: pulls back with the cube of the way from rest",
@@ -59,7 +59,7 @@ impl Effect<2, 0> for CubicStiffness {
     }
 }
 
-declare_effect!(CubicStiffness, "cubic_stiffness", <2, 0>);
+declare_effect!(CubicStiffness, "cubic_stiffness");
 
 #[cfg(test)]
 mod tests {

@@ -24,7 +24,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct DeadZone;
 
-impl Effect<1, 0> for DeadZone {
+impl Effect for DeadZone {
     const META: EffectMeta = EffectMeta {
         id: "dead_zone",
         summary: "commands below a threshold do nothing, and others lose it",
@@ -50,7 +50,7 @@ impl Effect<1, 0> for DeadZone {
     }
 }
 
-declare_effect!(DeadZone, "dead_zone", <1, 0>);
+declare_effect!(DeadZone, "dead_zone");
 
 #[cfg(test)]
 mod tests {

@@ -30,7 +30,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct DirectionalFriction;
 
-impl Effect<5, 0> for DirectionalFriction {
+impl Effect for DirectionalFriction {
     const META: EffectMeta = EffectMeta {
         id: "directional_friction",
         summary: "friction that differs forwards and backwards",
@@ -101,7 +101,7 @@ impl Effect<5, 0> for DirectionalFriction {
     }
 }
 
-declare_effect!(DirectionalFriction, "directional_friction", <5, 0>);
+declare_effect!(DirectionalFriction, "directional_friction");
 
 #[cfg(test)]
 mod tests {

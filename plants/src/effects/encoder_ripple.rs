@@ -31,7 +31,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct EncoderRipple;
 
-impl Effect<3, 0> for EncoderRipple {
+impl Effect for EncoderRipple {
     const META: EffectMeta = EffectMeta {
         id: "encoder_ripple",
         summary: "an eccentric encoder disc: the angle is counted unevenly, once per turn",
@@ -74,7 +74,7 @@ impl Effect<3, 0> for EncoderRipple {
     }
 }
 
-declare_effect!(EncoderRipple, "encoder_ripple", <3, 0>);
+declare_effect!(EncoderRipple, "encoder_ripple");
 
 #[cfg(test)]
 mod tests {

@@ -23,7 +23,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct GainAsymmetry;
 
-impl Effect<1, 0> for GainAsymmetry {
+impl Effect for GainAsymmetry {
     const META: EffectMeta = EffectMeta {
         id: "gain_asymmetry",
         summary: "one motor is stronger than the other",
@@ -52,7 +52,7 @@ impl Effect<1, 0> for GainAsymmetry {
     }
 }
 
-declare_effect!(GainAsymmetry, "gain_asymmetry", <1, 0>);
+declare_effect!(GainAsymmetry, "gain_asymmetry");
 
 #[cfg(test)]
 mod tests {

@@ -27,7 +27,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct GravityPendulum;
 
-impl Effect<2, 0> for GravityPendulum {
+impl Effect for GravityPendulum {
     const META: EffectMeta = EffectMeta {
         id: "gravity_pendulum",
         summary: "gravity on an arm or an unbalanced wheel: goes round with the angle",
@@ -58,7 +58,7 @@ impl Effect<2, 0> for GravityPendulum {
     }
 }
 
-declare_effect!(GravityPendulum, "gravity_pendulum", <2, 0>);
+declare_effect!(GravityPendulum, "gravity_pendulum");
 
 #[cfg(test)]
 mod tests {

@@ -27,7 +27,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct GravitySlope;
 
-impl Effect<2, 0> for GravitySlope {
+impl Effect for GravitySlope {
     const META: EffectMeta = EffectMeta {
         id: "gravity_slope",
         summary: "a slope under a vehicle: pushes downhill, whatever the heading",
@@ -57,7 +57,7 @@ impl Effect<2, 0> for GravitySlope {
     }
 }
 
-declare_effect!(GravitySlope, "gravity_slope", <2, 0>);
+declare_effect!(GravitySlope, "gravity_slope");
 
 #[cfg(test)]
 mod tests {

@@ -22,7 +22,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct InputDelay;
 
-impl Effect<1, 0> for InputDelay {
+impl Effect for InputDelay {
     const META: EffectMeta = EffectMeta {
         id: "input_delay",
         summary: "the command takes effect later than logged",
@@ -50,7 +50,7 @@ impl Effect<1, 0> for InputDelay {
     }
 }
 
-declare_effect!(InputDelay, "input_delay", <1, 0>);
+declare_effect!(InputDelay, "input_delay");
 
 #[cfg(test)]
 mod tests {

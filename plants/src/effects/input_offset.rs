@@ -23,7 +23,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct InputOffset;
 
-impl Effect<1, 0> for InputOffset {
+impl Effect for InputOffset {
     const META: EffectMeta = EffectMeta {
         id: "input_offset",
         summary: "something is added to every command",
@@ -46,7 +46,7 @@ impl Effect<1, 0> for InputOffset {
     }
 }
 
-declare_effect!(InputOffset, "input_offset", <1, 0>);
+declare_effect!(InputOffset, "input_offset");
 
 #[cfg(test)]
 mod tests {

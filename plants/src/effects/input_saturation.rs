@@ -22,7 +22,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct InputSaturation;
 
-impl Effect<1, 0> for InputSaturation {
+impl Effect for InputSaturation {
     const META: EffectMeta = EffectMeta {
         id: "input_saturation",
         summary: "the actuator gives no more than a limit",
@@ -47,7 +47,7 @@ impl Effect<1, 0> for InputSaturation {
     }
 }
 
-declare_effect!(InputSaturation, "input_saturation", <1, 0>);
+declare_effect!(InputSaturation, "input_saturation");
 
 #[cfg(test)]
 mod tests {

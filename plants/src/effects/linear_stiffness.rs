@@ -24,7 +24,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct LinearStiffness;
 
-impl Effect<2, 0> for LinearStiffness {
+impl Effect for LinearStiffness {
     const META: EffectMeta = EffectMeta {
         id: "linear_stiffness",
         summary: "a spring: pulls back in proportion to the way from rest",
@@ -56,7 +56,7 @@ impl Effect<2, 0> for LinearStiffness {
     }
 }
 
-declare_effect!(LinearStiffness, "linear_stiffness", <2, 0>);
+declare_effect!(LinearStiffness, "linear_stiffness");
 
 #[cfg(test)]
 mod tests {

@@ -32,7 +32,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct PayloadChange;
 
-impl Effect<4, 0> for PayloadChange {
+impl Effect for PayloadChange {
     const META: EffectMeta = EffectMeta {
         id: "payload_change",
         summary: "from an unknown time on mass and inertia are others",
@@ -103,7 +103,7 @@ impl Effect<4, 0> for PayloadChange {
     }
 }
 
-declare_effect!(PayloadChange, "payload_change", <4, 0>);
+declare_effect!(PayloadChange, "payload_change");
 
 #[cfg(test)]
 mod tests {

@@ -21,7 +21,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct QuadraticDrag;
 
-impl Effect<1, 0> for QuadraticDrag {
+impl Effect for QuadraticDrag {
     const META: EffectMeta = EffectMeta {
         id: "quadratic_drag",
         summary: "force against the motion that grows with the square of the speed",
@@ -51,7 +51,7 @@ impl Effect<1, 0> for QuadraticDrag {
     }
 }
 
-declare_effect!(QuadraticDrag, "quadratic_drag", <1, 0>);
+declare_effect!(QuadraticDrag, "quadratic_drag");
 
 #[cfg(test)]
 mod tests {

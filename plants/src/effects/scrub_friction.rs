@@ -24,7 +24,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct ScrubFriction;
 
-impl Effect<2, 0> for ScrubFriction {
+impl Effect for ScrubFriction {
     const META: EffectMeta = EffectMeta {
         id: "scrub_friction",
         summary: "dry friction about the vertical when a vehicle turns: tyres and castors dragged sideways",
@@ -66,7 +66,7 @@ impl Effect<2, 0> for ScrubFriction {
     }
 }
 
-declare_effect!(ScrubFriction, "scrub_friction", <2, 0>);
+declare_effect!(ScrubFriction, "scrub_friction");
 
 #[cfg(test)]
 mod tests {

@@ -22,7 +22,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct SensorDelay;
 
-impl Effect<1, 0> for SensorDelay {
+impl Effect for SensorDelay {
     const META: EffectMeta = EffectMeta {
         id: "sensor_delay",
         summary: "the measurement is older than its time stamp",
@@ -50,7 +50,7 @@ impl Effect<1, 0> for SensorDelay {
     }
 }
 
-declare_effect!(SensorDelay, "sensor_delay", <1, 0>);
+declare_effect!(SensorDelay, "sensor_delay");
 
 #[cfg(test)]
 mod tests {

@@ -31,7 +31,7 @@ use super::first_order;
 #[derive(Clone, Copy, Debug)]
 pub struct SensorLag;
 
-impl Effect<1, 1> for SensorLag {
+impl Effect for SensorLag {
     const META: EffectMeta = EffectMeta {
         id: "sensor_lag",
         summary: "the measurement follows the signal gradually, like through a low-pass filter",
@@ -63,7 +63,7 @@ impl Effect<1, 1> for SensorLag {
     }
 }
 
-declare_effect!(SensorLag, "sensor_lag", <1, 1>);
+declare_effect!(SensorLag, "sensor_lag");
 
 #[cfg(test)]
 mod tests {

@@ -22,7 +22,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct SensorOffset;
 
-impl Effect<1, 0> for SensorOffset {
+impl Effect for SensorOffset {
     const META: EffectMeta = EffectMeta {
         id: "sensor_offset",
         summary: "the sensor reads something at zero",
@@ -47,7 +47,7 @@ impl Effect<1, 0> for SensorOffset {
     }
 }
 
-declare_effect!(SensorOffset, "sensor_offset", <1, 0>);
+declare_effect!(SensorOffset, "sensor_offset");
 
 #[cfg(test)]
 mod tests {

@@ -23,7 +23,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct SensorScale;
 
-impl Effect<1, 0> for SensorScale {
+impl Effect for SensorScale {
     const META: EffectMeta = EffectMeta {
         id: "sensor_scale",
         summary: "the sensor reads too much or too little, in proportion",
@@ -48,7 +48,7 @@ impl Effect<1, 0> for SensorScale {
     }
 }
 
-declare_effect!(SensorScale, "sensor_scale", <1, 0>);
+declare_effect!(SensorScale, "sensor_scale");
 
 #[cfg(test)]
 mod tests {

@@ -27,7 +27,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct SensorWindow;
 
-impl Effect<1, 0> for SensorWindow {
+impl Effect for SensorWindow {
     const META: EffectMeta = EffectMeta {
         id: "sensor_window",
         summary: "the sensor reports a moving mean over a window",
@@ -54,7 +54,7 @@ impl Effect<1, 0> for SensorWindow {
     }
 }
 
-declare_effect!(SensorWindow, "sensor_window", <1, 0>);
+declare_effect!(SensorWindow, "sensor_window");
 
 #[cfg(test)]
 mod tests {

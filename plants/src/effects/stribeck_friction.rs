@@ -27,7 +27,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct StribeckFriction;
 
-impl Effect<4, 0> for StribeckFriction {
+impl Effect for StribeckFriction {
     const META: EffectMeta = EffectMeta {
         id: "stribeck_friction",
         summary: "dry friction that is higher at breakaway than in motion",
@@ -87,7 +87,7 @@ impl Effect<4, 0> for StribeckFriction {
     }
 }
 
-declare_effect!(StribeckFriction, "stribeck_friction", <4, 0>);
+declare_effect!(StribeckFriction, "stribeck_friction");
 
 #[cfg(test)]
 mod tests {

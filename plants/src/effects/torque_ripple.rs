@@ -27,7 +27,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueRipple;
 
-impl Effect<3, 0> for TorqueRipple {
+impl Effect for TorqueRipple {
     const META: EffectMeta = EffectMeta {
         id: "torque_ripple",
         summary: "a force that goes up and down with the angle of the shaft (cogging)",
@@ -65,7 +65,7 @@ impl Effect<3, 0> for TorqueRipple {
     }
 }
 
-declare_effect!(TorqueRipple, "torque_ripple", <3, 0>);
+declare_effect!(TorqueRipple, "torque_ripple");
 
 /// Counts from which a fit starts.
 const COUNTS: [f64; 24] = {

@@ -25,7 +25,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct ViscousFriction;
 
-impl Effect<1, 0> for ViscousFriction {
+impl Effect for ViscousFriction {
     const META: EffectMeta = EffectMeta {
         id: "viscous_friction",
         summary: "force against the motion, proportional to the speed",
@@ -50,7 +50,7 @@ impl Effect<1, 0> for ViscousFriction {
     }
 }
 
-declare_effect!(ViscousFriction, "viscous_friction", <1, 0>);
+declare_effect!(ViscousFriction, "viscous_friction");
 
 #[cfg(test)]
 mod tests {

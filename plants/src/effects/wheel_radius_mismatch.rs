@@ -24,7 +24,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct WheelRadiusMismatch;
 
-impl Effect<1, 0> for WheelRadiusMismatch {
+impl Effect for WheelRadiusMismatch {
     const META: EffectMeta = EffectMeta {
         id: "wheel_radius_mismatch",
         summary: "left and right wheels of different size",
@@ -56,7 +56,7 @@ impl Effect<1, 0> for WheelRadiusMismatch {
     }
 }
 
-declare_effect!(WheelRadiusMismatch, "wheel_radius_mismatch", <1, 0>);
+declare_effect!(WheelRadiusMismatch, "wheel_radius_mismatch");
 
 #[cfg(test)]
 mod tests {

@@ -50,7 +50,7 @@ const GRIP: f64 = 200.0;
 /// Rate of the filter that has the acceleration, 1/s.
 const FILTER: f64 = 800.0;
 
-impl Effect<4, 2> for WheelSlip {
+impl Effect for WheelSlip {
     const META: EffectMeta = EffectMeta {
         id: "wheel_slip",
         summary: "the ground takes no more than the traction limit; what exceeds it spins the wheel",
@@ -127,7 +127,7 @@ impl Effect<4, 2> for WheelSlip {
     }
 }
 
-declare_effect!(WheelSlip, "wheel_slip", <4, 2>);
+declare_effect!(WheelSlip, "wheel_slip");
 
 /// Back-emf at the speed over ground.
 fn over_ground<S: Real>(at: &Reading<'_, S>) -> S {

@@ -26,7 +26,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 #[derive(Clone, Copy, Debug)]
 pub struct WindingHeating;
 
-impl Effect<2, 1> for WindingHeating {
+impl Effect for WindingHeating {
     const META: EffectMeta = EffectMeta {
         id: "winding_heating",
         summary: "the resistance of the motor grows as it warms up",
@@ -72,7 +72,7 @@ impl Effect<2, 1> for WindingHeating {
     }
 }
 
-declare_effect!(WindingHeating, "winding_heating", <2, 1>);
+declare_effect!(WindingHeating, "winding_heating");
 
 /// Voltage over the winding: `nominal` may differ from the drive by effects before this one.
 fn over_winding<S: Real>(at: &Reading<'_, S>) -> S {

@@ -19,7 +19,7 @@ use cortex_m::peripheral::DWT;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::{entry, exception};
 use loopsight_link::{LONGEST, Note, Reply, encode};
-use loopsight_onboard::{Meter, Twil};
+use loopsight_onboard::{Meter, Session, Twil};
 use stm32f4xx_hal::pac::Peripherals;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
@@ -84,7 +84,7 @@ fn main() -> ! {
             line::send(&buffer[..length]);
         }
     };
-    let mut robot = Twil::with_sensors(PERIOD_US, Cycles(0));
+    let mut robot = Session::<Twil, _>::with_sensors(PERIOD_US, Cycles(0));
     say(&Reply::Log(Note::Started));
     loop {
         while let Some(byte) = line::received() {

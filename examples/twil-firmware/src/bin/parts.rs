@@ -19,8 +19,7 @@ use loopsight_controllers::FeedbackLinearizingPi;
 use loopsight_core::{AffineModel, Controller, Estimator, Tick};
 use loopsight_estimators::{Rls, RlsSettings};
 use loopsight_link::Attachment;
-use loopsight_onboard::{Efforts, Meter, Model};
-use loopsight_plants::Ddmr;
+use loopsight_onboard::{AffinePlant, Efforts, Meter, Twil};
 use nalgebra::{Const, SVector};
 
 /// Period of the loop, µs.
@@ -109,9 +108,8 @@ fn run(line: &mut mps2::Line, watch: &mut impl Meter) -> Option<()> {
         ("linearisation, two PI laws, limits", &[][..]),
         ("the same, friction compensated", &[friction]),
     ] {
-        let efforts = Efforts::new::<Ddmr, 6, 4, 8, 12>(effects, &PARAMETERS).ok()?;
-        let mut model: Model<f32, Ddmr, 6, 2, 4, 8, 12> =
-            Model::new(PARAMETERS, efforts, [0.04, 0.3]);
+        let efforts = Efforts::new(effects, &PARAMETERS).ok()?;
+        let mut model = AffinePlant::<Twil>::new(PARAMETERS, efforts, [0.04, 0.3]);
         let gains = |value: f64| SVector::from([value; 2]);
         let mut law = Control::new(
             &gains(17.78),

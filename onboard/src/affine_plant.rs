@@ -1,8 +1,9 @@
 //! A plant with its effects, as a control law aboard sees it.
 
-use loopsight_core::{AffineModel, ControlAffine, Plant, Real};
+use loopsight_core::{AffineModel, Array, ControlAffine, Real};
 
 use crate::Efforts;
+use crate::parts::{Parts, PerInput, PerParameter};
 
 /// A plant with effects on its efforts, in fixed sizes: `dy/dt = f(y) + H(y) w(x̄) + G(y) u`.
 ///
@@ -17,58 +18,43 @@ use crate::Efforts;
 ///
 /// Reference: H. Olsson, K. J. Åström, C. Canudas de Wit, M. Gäfvert, P. Lischinsky (1998), "Friction models
 /// and friction compensation", European Journal of Control 4, 176–195, section 5.
-pub struct Model<
-    S: 'static,
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NW: usize,
-    const NP: usize,
-    const NY: usize,
-> {
+pub struct AffinePlant<R: Parts> {
     /// Parameters of the plant.
-    pub parameters: [S; NP],
-    efforts: Efforts<S, NU>,
-    bands: [S; NU],
-    aim: [S; NU],
-    plant: core::marker::PhantomData<P>,
+    pub parameters: PerParameter<R>,
+    efforts: Efforts<R>,
+    bands: PerInput<R>,
+    aim: PerInput<R>,
 }
 
-impl<S, P, const NX: usize, const NU: usize, const NW: usize, const NP: usize, const NY: usize>
-    Model<S, P, NX, NU, NW, NP, NY>
-where
-    S: Real,
-    P: Plant<NX, NU, NW, NP, NY> + ControlAffine<NU, NU, NW, NP>,
-{
+impl<R: Parts> AffinePlant<R> {
     /// The plant with these parameters and effects; `bands` is how far from rest each controlled state
     /// has a direction.
-    pub fn new(parameters: [S; NP], efforts: Efforts<S, NU>, bands: [S; NU]) -> Self {
+    pub fn new(parameters: PerParameter<R>, efforts: Efforts<R>, bands: PerInput<R>) -> Self {
         Self {
             parameters,
             efforts,
             bands,
-            aim: [S::zero(); NU],
-            plant: core::marker::PhantomData,
+            aim: PerInput::<R>::filled(R::Scalar::of(0.0)),
         }
     }
 }
 
-impl<S, P, const NX: usize, const NU: usize, const NW: usize, const NP: usize, const NY: usize>
-    AffineModel<S> for Model<S, P, NX, NU, NW, NP, NY>
-where
-    S: Real,
-    P: Plant<NX, NU, NW, NP, NY> + ControlAffine<NU, NU, NW, NP>,
-{
+impl<R: Parts> AffineModel<R::Scalar> for AffinePlant<R> {
     fn size(&self) -> usize {
-        NU
+        PerInput::<R>::LENGTH
     }
 
     #[inline(always)]
-    fn evaluate(&mut self, y: &[S], drift: &mut [S], input_matrix: &mut [S]) {
-        let Ok(y) = <&[S; NU]>::try_from(y) else {
+    fn evaluate(
+        &mut self,
+        y: &[R::Scalar],
+        drift: &mut [R::Scalar],
+        input_matrix: &mut [R::Scalar],
+    ) {
+        let Some(y) = PerInput::<R>::from_slice(y) else {
             return;
         };
-        let towards = core::array::from_fn(|i| {
+        let towards = PerInput::<R>::from_fn(|i| {
             let (band, way) = (self.bands[i], self.aim[i] - y[i]);
             if way.abs() > band {
                 y[i] + way.held(-band, band)
@@ -78,25 +64,26 @@ where
         });
         let p = &self.parameters;
         let w = self.efforts.at(&towards);
-        let (f, push, g) = (P::drift(y, p), P::push(y, &w, p), P::input_matrix(y, p));
-        for (to, (f, push)) in drift.iter_mut().zip(f.iter().zip(push)) {
-            *to = *f + push;
+        let (f, push) = (R::Plant::drift(y, p), R::Plant::push(y, &w, p));
+        let g = R::Plant::input_matrix(y, p);
+        for (to, (f, push)) in drift.iter_mut().zip(f.into_iter().zip(push)) {
+            *to = f + push;
         }
         // By rows, whose length is known when this is compiled.
-        let (rows, _) = input_matrix.as_chunks_mut::<NU>();
+        let rows = PerInput::<R>::chunks_mut(input_matrix);
         for (to, from) in rows.iter_mut().zip(g) {
             *to = from;
         }
     }
 
-    fn aim(&mut self, wanted: &[S]) {
-        if wanted.len() == NU {
-            self.aim = core::array::from_fn(|i| wanted[i]);
+    fn aim(&mut self, wanted: &[R::Scalar]) {
+        if let Some(wanted) = PerInput::<R>::from_slice(wanted) {
+            self.aim = *wanted;
         }
     }
 
-    fn learn(&mut self, parameter: usize, value: S) {
-        if let Some(known) = self.parameters.get_mut(parameter)
+    fn learn(&mut self, parameter: usize, value: R::Scalar) {
+        if let Some(known) = self.parameters.as_mut().get_mut(parameter)
             && value.is_finite()
         {
             *known = value;
@@ -104,9 +91,11 @@ where
     }
 
     /// All of them, or none: a sum is finite where all of it is.
-    fn learn_all(&mut self, values: &[S]) {
-        if let Ok(values) = <&[S; NP]>::try_from(values)
-            && (values.iter().fold(S::zero(), |sum, v| sum + *v)).is_finite()
+    fn learn_all(&mut self, values: &[R::Scalar]) {
+        if let Some(values) = PerParameter::<R>::from_slice(values)
+            && (values.as_ref().iter())
+                .fold(R::Scalar::of(0.0), |sum, v| sum + *v)
+                .is_finite()
         {
             self.parameters = *values;
         }
