@@ -197,9 +197,9 @@ pub trait EffectArrays {
 ///
 /// declare_effect!(DiscDrag, "disc_drag");
 ///
-/// let speed = -3.0;
+/// let speed = -2.0;
 /// let at = Reading::nothing().with(Role::Flow, &speed);
-/// assert_eq!(<DiscDrag as Effect>::contribution(&at, &[], &[0.1]), 0.9);
+/// assert_eq!(<DiscDrag as Effect>::contribution(&at, &[], &[0.5]), 2.0);
 /// ```
 pub trait Effect: EffectArrays + Sized + Send + Sync + 'static {
     /// Names, places, parameters, equation, symptom, remedy, reference.
