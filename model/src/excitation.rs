@@ -155,10 +155,10 @@ impl Excitation {
     /// signals independent of each other, whatever their seeds.
     ///
     /// ```
-    /// use loopsight_core::excitation::Excitation;
+    /// use loopsight_model::excitation::Excitation;
     /// let steps = Excitation::Steps { at: vec![[1.0, 9.0], [2.0, -9.0]] }.build("voltage_right")?;
     /// assert_eq!([0.99, 1.0, 2.5].map(|t| steps.sample(t)), [0.0, 9.0, -9.0]);
-    /// # Ok::<(), loopsight_core::registry::BuildError>(())
+    /// # Ok::<(), loopsight_model::registry::BuildError>(())
     /// ```
     pub fn build(&self, signal: &str) -> Result<Sequence, BuildError> {
         let read: &ReadColumn<'_> = &no_files;

@@ -23,7 +23,7 @@ pub struct ParameterDraft {
 /// library has nothing that fits.
 ///
 /// ```
-/// use loopsight_core::expression::{EffectDraft, ParameterDraft};
+/// use loopsight_model::expression::{EffectDraft, ParameterDraft};
 ///
 /// let draft = EffectDraft {
 ///     at: vec!["shaft".to_owned()],
