@@ -1,7 +1,8 @@
 //! What a design takes from a model: its input matrix and damping at rest.
 
 use loopsight_core::AffineModel;
-use loopsight_model::model::{Affine, Model};
+use loopsight_model::affine::Affine;
+use loopsight_model::model::Model;
 use loopsight_model::registry::BuildError;
 
 use crate::{Singular, solve};

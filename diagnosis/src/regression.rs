@@ -1,8 +1,9 @@
 //! Regressions over whole recordings.
 
+use loopsight_model::log_map::Hold;
 use loopsight_model::model::{Model, pseudo_inverse};
 pub use loopsight_model::regression::{Regression, Scheme};
-use loopsight_model::run::{Hold, Run};
+use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::FitError;

@@ -8,7 +8,8 @@ mod treatment;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::{Model, pseudo_inverse};
+use crate::model::Model;
+use crate::pseudo_inverse::pseudo_inverse;
 use crate::registry::HostReal;
 use crate::simulate::bound::{Bounds, Scene};
 use loopsight_core::AffineModel;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::config::{ConfigError, Source, Step, nearest};
-use crate::model::{Attached, Model, ModelParameter, signal_index, signals};
+use crate::model::{Attached, ModelParameter, signal_index, signals};
 use crate::registry::{EffectPart, ReadyEffect};
 use loopsight_core::{Channel, EffectMeta, PlantMeta, Role};
 
@@ -67,7 +67,7 @@ pub(crate) fn attach(
 }
 
 /// Binds an effect to channels that it fits; its table stands at `base`.
-fn bind(
+pub(crate) fn bind(
     plant: &'static PlantMeta,
     ready: ReadyEffect,
     at: Vec<&'static Channel>,
@@ -114,33 +114,6 @@ fn bind(
     }
 }
 
-impl Model {
-    /// The model with the effect `id` added at the channels `at`, with the effect's default
-    /// parameters. `None` when there is no such effect or it does not fit one of the channels.
-    pub fn with_effect(&self, id: &str, at: &[&str]) -> Option<Model> {
-        let ready = crate::registry::effect(id)?;
-        let channels: Option<Vec<&'static Channel>> = at
-            .iter()
-            .map(|name| self.plant.channels.iter().find(|c| c.id == *name))
-            .collect();
-        let channels = channels?;
-        let fits = |c: &&'static Channel| misfit(c, ready.meta).is_none();
-        if channels.is_empty() || !channels.iter().all(fits) {
-            return None;
-        }
-        let mut model = self.clone();
-        let base: [Step; 3] = [
-            "effect".into(),
-            model.effects.len().into(),
-            ready.meta.id.into(),
-        ];
-        let attached = bind(self.plant, ready, channels, &base, &mut model.parameters);
-        model.effects.push(attached);
-        make_names_unique(&mut model.parameters, &model.effects);
-        Some(model)
-    }
-}
-
 /// The unit of an effect's parameter at a channel, and what 1 of its default and scale is there:
 /// `channel`, `flow` and `position` are filled in.
 ///
@@ -176,61 +149,6 @@ pub fn unit_at(unit: &str, channel: &Channel, plant: &'static PlantMeta) -> (Str
         };
     }
     (filled, total)
-}
-
-impl Model {
-    /// The model with its `index`-th effect replaced by the effect `id` at the channels `at`;
-    /// parameters of the same name keep their values.
-    pub fn with_effect_replaced(&self, index: usize, id: &str, at: &[&str]) -> Option<Model> {
-        self.with_effect_changed(index, |model, old| {
-            let first = model.parameters.len();
-            let mut model = model.with_effect(id, at)?;
-            for new in &mut model.parameters[first..] {
-                if let Some(from) = old.iter().find(|p| p.declaration.id == new.declaration.id) {
-                    new.value = from.value;
-                    new.free = from.free;
-                }
-            }
-            Some(model)
-        })
-    }
-
-    /// The model without its `index`-th effect.
-    pub fn without_effect(&self, index: usize) -> Option<Model> {
-        self.with_effect_changed(index, |model, _| Some(model))
-    }
-
-    /// The model with what `change` makes, in the place of its `index`-th effect, of the model up to
-    /// there and the effect's parameters.
-    fn with_effect_changed(
-        &self,
-        index: usize,
-        change: impl Fn(Model, &[ModelParameter]) -> Option<Model>,
-    ) -> Option<Model> {
-        self.effects.get(index)?;
-        let mut model = self.clone();
-        model.effects.clear();
-        model.parameters.truncate(self.n_plant_parameters);
-        for (k, effect) in self.effects.iter().enumerate() {
-            let first = effect.first_parameter;
-            let own = &self.parameters[first..first + effect.meta.parameters.len()];
-            if k == index {
-                model = change(model, own)?;
-            } else {
-                model.keep(effect, own);
-            }
-        }
-        make_names_unique(&mut model.parameters, &model.effects);
-        Some(model)
-    }
-
-    /// Takes an effect of another model over, with its parameters.
-    fn keep(&mut self, effect: &Attached, own: &[ModelParameter]) {
-        let mut kept = effect.clone();
-        kept.first_parameter = self.parameters.len();
-        self.parameters.extend_from_slice(own);
-        self.effects.push(kept);
-    }
 }
 
 /// Why an effect cannot act on a channel; `None` when it can.

@@ -7,39 +7,10 @@ use serde::de::{Error as _, MapAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::registry::{DeclaredEffect, DeclaredPlant};
 use loopsight_core::{Parameter, Parameterization};
 
-/// Parameter values as a file gives them, in the order of the declaration.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Values {
-    /// 0: the equations' own parameters; `i`: the `i`-th other parameterization.
-    pub set: usize,
-    /// One per parameter of that set; `None` where the file is silent.
-    pub given: Vec<Option<f64>>,
-}
-
-impl Values {
-    fn empty(set: usize, parameters: &[Parameter]) -> Self {
-        Self {
-            set,
-            given: vec![None; parameters.len()],
-        }
-    }
-
-    fn serialize_into<M: SerializeMap>(
-        &self,
-        map: &mut M,
-        parameters: &[Parameter],
-    ) -> Result<(), M::Error> {
-        for (parameter, value) in parameters.iter().zip(&self.given) {
-            if let Some(value) = value {
-                map.serialize_entry(parameter.id, value)?;
-            }
-        }
-        Ok(())
-    }
-}
+use crate::registry::{DeclaredEffect, DeclaredPlant};
+use crate::values::{Values, range_text};
 
 /// Reads one `key = number` of a parameter table.
 fn read_parameter<'de, A: MapAccess<'de>>(
@@ -68,28 +39,6 @@ fn read_parameter<'de, A: MapAccess<'de>>(
     }
     given[index] = Some(value);
     Ok(())
-}
-
-/// The range of a parameter in words, e.g. `a number above 0 kg`.
-pub fn range_text(parameter: &Parameter) -> String {
-    let unit = parameter.unit;
-    match (
-        parameter.min.is_finite(),
-        parameter.max.is_finite(),
-        parameter.open,
-    ) {
-        (false, false, _) => "a finite number".to_owned(),
-        (true, false, true) => format!("a number above {} {unit}", parameter.min),
-        (true, false, false) => format!("a number from {} {unit} upwards", parameter.min),
-        (false, true, true) => format!("a number below {} {unit}", parameter.max),
-        (false, true, false) => format!("a number up to {} {unit}", parameter.max),
-        (true, true, _) => {
-            format!(
-                "a number from {} to {} {unit}",
-                parameter.min, parameter.max
-            )
-        }
-    }
 }
 
 /// A plant with the parameters of a file.

@@ -4,7 +4,7 @@
 //! What a plant, an effect, an estimator, a controller and a driver are is said in
 //! [`loopsight_core`].
 
-mod affine;
+pub mod affine;
 mod attach;
 pub mod config;
 mod configured;
@@ -14,15 +14,18 @@ pub mod excitation;
 pub mod expression;
 pub mod identification;
 pub mod limits;
+pub mod log_map;
 pub mod loop_file;
 pub mod model;
 mod observe;
+mod pseudo_inverse;
 pub mod registry;
 pub mod regression;
 pub mod run;
 pub mod sensor;
 pub mod simulate;
 pub mod supervisor;
+mod values;
 
 pub use dual::{DUAL_WIDTH, Dual, derivative, variable};
 

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::affine::{Affine, Treatment};
 use crate::config::{ConfigError, Source, Step};
 use crate::excitation::{self, Excitation, Sequence};
 use crate::identification::{Identification, IdentificationError, LearningSettings};
 use crate::limits::{self, LimitSettings};
-use crate::model::{Affine, Model, Treatment};
+use crate::model::Model;
 use crate::registry::{
     BuildError, ControllerPart, DriverContext, DriverPart, EstimatorPart, HalfError, HostDriver,
     HostDriverError,

@@ -1,146 +1,29 @@
 //! A model: a plant with effects, sensors and parameter values, composed from TOML.
 
+mod attached;
+mod change;
+mod error;
+mod file;
+mod parameter;
+mod signals;
+
 use std::path::Path;
 
-use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
+use loopsight_core::{Derived, Parameter, Place, PlantMeta};
 
-pub use crate::affine::{Affine, Treatment};
 use crate::attach::{attach, make_names_unique};
 pub use crate::attach::{misfit, unit_at};
-use crate::config::{ConfigError, ReadError, Source, Step, nearest, read_text};
-use crate::registry::{AnyDynamics, AnyPhysics, EffectPart, HostReal, PlantPart};
-use crate::run::{ColumnMap, Hold, LogMap};
+use crate::config::{ConfigError, Source, Step, nearest, read_text};
+use crate::log_map::{ColumnMap, Hold, LogMap};
+pub use crate::pseudo_inverse::pseudo_inverse;
+use crate::registry::{AnyDynamics, HostReal};
 use crate::sensor::Sensor;
-use loopsight_core::{Channel, Derived, EffectMeta, Parameter, Place, PlantMeta, Role, Signal};
-
-/// A model file, as written.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ModelFile {
-    /// Name of the robot, for titles.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// The plant.
-    pub plant: Box<dyn PlantPart>,
-    /// Effects, in the order they are applied.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub effect: Vec<Box<dyn EffectPart>>,
-    /// How a log maps on the plant's signals.
-    #[serde(default)]
-    pub log: LogMap,
-    /// How the model is integrated.
-    #[serde(default)]
-    pub simulation: SimulationOptions,
-    /// What a fit estimates.
-    #[serde(default)]
-    pub fit: FitOptions,
-}
-
-/// `[simulation]`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SimulationOptions {
-    /// Longest integration step, s; by default the plant's own ([`Plant::MAX_STEP_S`](loopsight_core::Plant::MAX_STEP_S)).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub max_step_s: Option<f64>,
-}
-
-/// `[fit]`: parameters that a fit estimates or holds, where this differs from their declaration.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FitOptions {
-    /// Estimated though declared as known.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub free: Vec<String>,
-    /// Held though declared as estimated.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub fixed: Vec<String>,
-}
-
-/// Why a model could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum ModelError {
-    /// The file could not be read.
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// A mistake in the file.
-    #[error(transparent)]
-    Config(#[from] Box<ConfigError>),
-    /// No part is linked into the program.
-    #[error(
-        "no plant is known to this program: link the crate that declares it with `use … as _;`"
-    )]
-    EmptyRegistry,
-    /// Parts share an id.
-    #[error("parts with the same id are linked: {}", .0.join(", "))]
-    Duplicates(Vec<String>),
-}
-
-/// A parameter of a composed model.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ModelParameter {
-    /// Name within the model: `K_A`, `coulomb_friction.level`.
-    pub name: String,
-    /// Its declaration.
-    pub declaration: &'static Parameter,
-    /// SI unit, that of the channel filled in.
-    pub unit: String,
-    /// Its value; `None` where neither file nor declaration give one: a fit has to find it.
-    pub value: Option<f64>,
-    /// A fit estimates it.
-    pub free: bool,
-    /// What 1 of the declaration's default, scale and starts is here, in `unit`: 1 for parameters
-    /// of a plant, for those of an effect see [`loopsight_core::Channel::size`].
-    pub size: f64,
-    /// Where it stands in the file.
-    pub path: Vec<Step>,
-}
-
-impl ModelParameter {
-    /// Size of a noticeable change, in `unit`.
-    pub fn scale(&self) -> f64 {
-        self.declaration.scale * self.size
-    }
-
-    /// Values from which a fit to a recording of `duration` s should start; empty where one start
-    /// will do.
-    pub fn starts(&self, duration: f64) -> Vec<f64> {
-        let unit = if self.declaration.starts_in_durations {
-            duration
-        } else {
-            self.size
-        };
-        self.declaration.starts.iter().map(|s| s * unit).collect()
-    }
-}
-
-/// An effect of a composed model, bound to its channels.
-#[derive(Clone)]
-pub struct Attached {
-    /// The declaration.
-    pub meta: &'static EffectMeta,
-    /// The channels, in the order of the file.
-    pub at: Vec<&'static Channel>,
-    /// First of its parameters in [`Model::parameters`].
-    pub first_parameter: usize,
-    pub(crate) physics: &'static dyn AnyPhysics,
-    /// For each channel and role, the index of the signal that plays it.
-    pub(crate) reads: Vec<[Option<usize>; Role::COUNT]>,
-    /// Signals it reads beside those.
-    pub(crate) signals: Vec<usize>,
-}
-
-/// A measured signal of a composed model.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MeasuredSignal {
-    /// Index among states, inputs and outputs, in that order.
-    pub index: usize,
-    /// The declaration.
-    pub signal: &'static Signal,
-    /// How the number is made.
-    pub sensor: Sensor,
-}
+pub use attached::{Attached, MeasuredSignal};
+pub use error::ModelError;
+pub use file::{FitOptions, ModelFile, SimulationOptions};
+pub use parameter::ModelParameter;
+pub(crate) use signals::signal_index;
+pub use signals::signals;
 
 /// A plant with effects, sensors and parameter values, checked.
 #[derive(Clone)]
@@ -172,15 +55,6 @@ impl std::fmt::Debug for Model {
             .field("parameters", &self.parameters)
             .finish_non_exhaustive()
     }
-}
-
-/// Signals of a plant by index: states, then inputs, then outputs.
-pub fn signals(plant: &'static PlantMeta) -> impl Iterator<Item = &'static Signal> {
-    plant.states.iter().chain(plant.inputs).chain(plant.outputs)
-}
-
-pub(crate) fn signal_index(plant: &'static PlantMeta, id: &str) -> Option<usize> {
-    signals(plant).position(|s| s.id == id)
 }
 
 impl Model {
@@ -438,23 +312,6 @@ impl Model {
             *output = dynamics.output(index, x, u, p);
         }
     }
-}
-
-/// Moore–Penrose inverse, singular values below 1e-9 of the largest left out; `None` when it
-/// cannot be computed (not finite).
-pub fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    if matrix.iter().any(|v| !v.is_finite()) {
-        return None;
-    }
-    // The decomposition below refuses a matrix without rows or columns; its inverse has none either.
-    if matrix.is_empty() {
-        return Some(matrix.transpose());
-    }
-    let largest = matrix.iter().fold(0.0f64, |a, v| a.max(v.abs()));
-    matrix
-        .clone()
-        .pseudo_inverse(1e-9 * largest.max(f64::MIN_POSITIVE))
-        .ok()
 }
 
 fn check_inputs(

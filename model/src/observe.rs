@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::{Model, pseudo_inverse};
+use crate::model::Model;
+use crate::pseudo_inverse::pseudo_inverse;
 use crate::registry::HostReal;
 use crate::{DUAL_WIDTH, Dual, derivative, variable};
 use loopsight_core::Real;

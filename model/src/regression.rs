@@ -5,9 +5,10 @@ mod acting;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Model, pseudo_inverse};
+use crate::log_map::Hold;
+use crate::model::Model;
+use crate::pseudo_inverse::pseudo_inverse;
 use crate::registry::HostReal;
-use crate::run::Hold;
 use acting::Acting;
 use loopsight_core::Dynamics;
 

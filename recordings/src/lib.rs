@@ -3,7 +3,7 @@
 //!
 //! ```
 //! use loopsight_core::Signal;
-//! use loopsight_model::run::LogMap;
+//! use loopsight_model::log_map::LogMap;
 //! use loopsight_recordings::{Source, map, read_csv_from};
 //!
 //! let text = "time_s,voltage_V,speed_rpm\n0.0,0,0\n0.5,6,30\n1.0,6,60\n1.5,3,30\n";

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use loopsight_core::Signal;
-use loopsight_model::run::{LogMap, Run};
+use loopsight_model::log_map::LogMap;
+use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
 
 use crate::error::RecordingError;

@@ -2,7 +2,7 @@
 
 use loopsight_core::Signal;
 use loopsight_core::unit::{Unit, conversion, parse};
-use loopsight_model::run::LogMap;
+use loopsight_model::log_map::LogMap;
 
 use crate::error::{RecordingError, nearest};
 use crate::fault::{Fault, FaultKind};

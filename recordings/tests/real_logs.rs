@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use loopsight_core::Signal;
-use loopsight_model::run::{Column, ColumnMap, Hold, LogMap, Measured};
+use loopsight_model::log_map::{Column, ColumnMap, Hold, LogMap, Measured};
 use loopsight_recordings::{FaultKind, Recording, Severity, Source, map, read};
 
 const DRIVE_INPUTS: [Signal; 2] = [

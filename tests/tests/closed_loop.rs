@@ -7,8 +7,9 @@
 
 use loopsight_controllers::{PiResponse, settling_time};
 use loopsight_core::{Controller, Driver, DriverFault, Loop, Rk4, Sample, SimulatedClock};
+use loopsight_model::affine::Affine;
 use loopsight_model::config::Source;
-use loopsight_model::model::{Affine, Model};
+use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, ControllerPart};
 use loopsight_plants as _;
 

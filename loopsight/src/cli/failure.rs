@@ -98,7 +98,7 @@ impl From<ModelError> for Failure {
         match error {
             ModelError::Config(error) => error.into(),
             ModelError::Read(error) => error.into(),
-            ModelError::EmptyRegistry | ModelError::Duplicates(_) => Self::work(error.to_string()),
+            ModelError::Registry(_) => Self::work(error.to_string()),
         }
     }
 }

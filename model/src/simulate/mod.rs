@@ -8,22 +8,23 @@ mod push;
 mod ramp;
 mod sensing;
 mod start;
+mod state_observer;
 mod values;
 
 use std::borrow::Cow;
 
+use crate::log_map::Hold;
 use crate::model::Model;
 use crate::registry::HostReal;
-use crate::run::Hold;
 use loopsight_core::{NoPast, Place, Rk4, substeps};
 
 use bound::{Bounds, Scene};
 pub use follow::{follow, free_run, try_follow};
 use history::{Between, History};
-pub use observer::StateObserver;
 use push::Pushed;
 use ramp::{hold_means, ramped};
 use sensing::{Integral, Sensing, sense};
+pub use state_observer::StateObserver;
 
 /// Integrates a model through time.
 ///

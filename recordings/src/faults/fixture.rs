@@ -1,7 +1,7 @@
 //! A small differential drive, exact and without noise, for tests of faults.
 
 use loopsight_core::Signal;
-use loopsight_model::run::LogMap;
+use loopsight_model::log_map::LogMap;
 
 use crate::fault::FaultKind;
 use crate::map::Recording;

@@ -164,7 +164,7 @@ fn ratio(table: &Table, plan: &Plan, angle: &Column, rate: &Column) -> Option<(f
 #[cfg(test)]
 mod tests {
     use loopsight_core::Signal;
-    use loopsight_model::run::LogMap;
+    use loopsight_model::log_map::LogMap;
 
     use super::*;
     use crate::{Severity, Source, map, read_csv_from};

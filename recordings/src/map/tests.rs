@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use loopsight_model::run::{Column, ColumnMap, Hold, Measured};
+use loopsight_model::log_map::{Column, ColumnMap, Hold, Measured};
 use proptest::prelude::*;
 
 use super::*;

@@ -15,13 +15,13 @@ use loopsight_core::Parameter;
 use loopsight_model::config::Source;
 use loopsight_model::excitation::{Between, Excitation};
 use loopsight_model::identification::LearningSettings;
+use loopsight_model::log_map::{Column, ColumnMap, Hold, LogMap, Measured};
 use loopsight_model::loop_file::LoopFile;
 use loopsight_model::model::{FitOptions, Model, ModelFile, SimulationOptions, misfit};
 use loopsight_model::registry::{
     ControllerPart, DriverPart, EstimatorPart, effects, parts as linked, plants,
 };
 use loopsight_model::regression::Scheme;
-use loopsight_model::run::{Column, ColumnMap, Hold, LogMap, Measured};
 use loopsight_model::sensor::{Encoder, Sensor};
 use loopsight_plants as _;
 use loopsight_tests as _;

@@ -1,0 +1,156 @@
+//! How the columns of a log map on the signals of a model.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::sensor::Sensor;
+
+/// How the columns of a log map on the signals of a model: the table `[log]` of a model file.
+///
+/// Signals that are not mentioned are looked for by name: the column `linear_velocity_m_per_s`
+/// is the signal `linear_velocity` in m/s.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogMap {
+    /// Column of the time stamps; by default the first column whose name begins with `time` or
+    /// is `t`, with a unit of time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<ColumnMap>,
+    /// Column of a run number or name; rows with another value start a new run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub run: Option<String>,
+    /// Inputs of the plant, by id.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub inputs: BTreeMap<String, ColumnMap>,
+    /// Measured signals, by id. Empty: every signal of the plant for which the log has a column.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub measured: BTreeMap<String, Measured>,
+}
+
+/// A column of a log: its name alone, or with unit and scale.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ColumnMap {
+    /// The name; the unit is read from its ending.
+    Name(String),
+    /// Name, unit, factor.
+    Full(Column),
+}
+
+/// A column with its conversion: SI value = (value in `unit` as SI) times (`scale` in `scale_unit`
+/// as SI).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Column {
+    /// Name in the header.
+    pub column: String,
+    /// Unit when the name does not end with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// Factor; `-1` reverses the sign.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub scale: f64,
+    /// Unit of `scale` where the column holds what a transducer makes of the signal: `m/V`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_unit: Option<String>,
+    /// How an input runs between its samples.
+    #[serde(default, skip_serializing_if = "Hold::is_zero_order")]
+    pub hold: Hold,
+}
+
+/// How an input runs between the samples of a log (A. V. Oppenheim, R. W. Schafer, 2010,
+/// "Discrete-Time Signal Processing", 3rd edition, section 4.2).
+///
+/// A command that a computer puts out is a staircase. An input that was *measured*, or a smooth
+/// reference, is not: to take it for one is to find half a sample of delay in a perfect model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hold {
+    /// Constant until the next sample.
+    #[default]
+    ZeroOrder,
+    /// A straight line to the next sample.
+    FirstOrder,
+}
+
+impl Hold {
+    fn is_zero_order(&self) -> bool {
+        *self == Hold::ZeroOrder
+    }
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "the signature serde asks for"
+)]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
+impl ColumnMap {
+    /// Name in the header.
+    pub fn name(&self) -> &str {
+        match self {
+            ColumnMap::Name(name) => name,
+            ColumnMap::Full(column) => &column.column,
+        }
+    }
+
+    /// Unit given in the model file.
+    pub fn unit(&self) -> Option<&str> {
+        match self {
+            ColumnMap::Name(_) => None,
+            ColumnMap::Full(column) => column.unit.as_deref(),
+        }
+    }
+
+    /// Factor.
+    pub fn scale(&self) -> f64 {
+        match self {
+            ColumnMap::Name(_) => 1.0,
+            ColumnMap::Full(column) => column.scale,
+        }
+    }
+
+    /// Unit of the factor.
+    pub fn scale_unit(&self) -> Option<&str> {
+        match self {
+            ColumnMap::Name(_) => None,
+            ColumnMap::Full(column) => column.scale_unit.as_deref(),
+        }
+    }
+
+    /// How an input runs between its samples.
+    pub fn hold(&self) -> Hold {
+        match self {
+            ColumnMap::Name(_) => Hold::ZeroOrder,
+            ColumnMap::Full(column) => column.hold,
+        }
+    }
+}
+
+/// A measured signal: which column, and what kind of sensor made it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measured {
+    /// Name in the header; by default found by the signal's id.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub column: Option<String>,
+    /// Unit when the name does not end with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// Factor; `-1` reverses the sign.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale: Option<f64>,
+    /// Unit of `scale` where the column holds what a transducer makes of the signal: `m/V`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_unit: Option<String>,
+    /// How the number is made.
+    #[serde(default)]
+    pub sensor: Sensor,
+}

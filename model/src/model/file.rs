@@ -1,0 +1,50 @@
+//! A model file, as written.
+
+use serde::{Deserialize, Serialize};
+
+use crate::log_map::LogMap;
+use crate::registry::{EffectPart, PlantPart};
+
+/// A model file, as written.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelFile {
+    /// Name of the robot, for titles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// The plant.
+    pub plant: Box<dyn PlantPart>,
+    /// Effects, in the order they are applied.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effect: Vec<Box<dyn EffectPart>>,
+    /// How a log maps on the plant's signals.
+    #[serde(default)]
+    pub log: LogMap,
+    /// How the model is integrated.
+    #[serde(default)]
+    pub simulation: SimulationOptions,
+    /// What a fit estimates.
+    #[serde(default)]
+    pub fit: FitOptions,
+}
+
+/// `[simulation]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulationOptions {
+    /// Longest integration step, s; by default the plant's own ([`Plant::MAX_STEP_S`](loopsight_core::Plant::MAX_STEP_S)).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_step_s: Option<f64>,
+}
+
+/// `[fit]`: parameters that a fit estimates or holds, where this differs from their declaration.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitOptions {
+    /// Estimated though declared as known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub free: Vec<String>,
+    /// Held though declared as estimated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixed: Vec<String>,
+}

@@ -1,0 +1,43 @@
+//! The parameters of a composed model.
+
+use loopsight_core::Parameter;
+
+use crate::config::Step;
+
+/// A parameter of a composed model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelParameter {
+    /// Name within the model: `K_A`, `coulomb_friction.level`.
+    pub name: String,
+    /// Its declaration.
+    pub declaration: &'static Parameter,
+    /// SI unit, that of the channel filled in.
+    pub unit: String,
+    /// Its value; `None` where neither file nor declaration give one: a fit has to find it.
+    pub value: Option<f64>,
+    /// A fit estimates it.
+    pub free: bool,
+    /// What 1 of the declaration's default, scale and starts is here, in `unit`: 1 for parameters
+    /// of a plant, for those of an effect see [`loopsight_core::Channel::size`].
+    pub size: f64,
+    /// Where it stands in the file.
+    pub path: Vec<Step>,
+}
+
+impl ModelParameter {
+    /// Size of a noticeable change, in `unit`.
+    pub fn scale(&self) -> f64 {
+        self.declaration.scale * self.size
+    }
+
+    /// Values from which a fit to a recording of `duration` s should start; empty where one start
+    /// will do.
+    pub fn starts(&self, duration: f64) -> Vec<f64> {
+        let unit = if self.declaration.starts_in_durations {
+            duration
+        } else {
+            self.size
+        };
+        self.declaration.starts.iter().map(|s| s * unit).collect()
+    }
+}
