@@ -39,7 +39,7 @@ where
         let mut saturated = false;
         for (value, limit) in command.iter_mut().zip(self.limit.iter()) {
             if value.abs() > *limit {
-                *value = value.held(-*limit, *limit);
+                *value = value.clamp(-*limit, *limit);
                 saturated = true;
             }
         }

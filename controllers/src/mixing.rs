@@ -65,7 +65,7 @@ where
                 column.as_mut_slice(),
                 scale.as_mut_slice(),
             )?;
-            let largest = column.iter().fold(0.0f64, |a, v| a.larger(v.abs()));
+            let largest = column.iter().fold(0.0f64, |a, v| a.max(v.abs()));
             mixing.gain[j] = S::of(1.0 / largest);
             for i in 0..n {
                 mixing.rows.as_mut_slice()[i * n + j] = S::of(column[i] / largest);

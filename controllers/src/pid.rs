@@ -177,7 +177,7 @@ where
             let lack = self.achieved[i] - self.demand[i];
             let next = self.integral[i]
                 + gains.integral[i] * period * (reference[i] - measured[i])
-                + (period / gains.tracking[i]).smaller(S::one()) * lack;
+                + (period / gains.tracking[i]).min(S::one()) * lack;
             if next.is_finite() {
                 self.integral[i] = next;
             }

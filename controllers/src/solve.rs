@@ -42,7 +42,7 @@ pub fn solve<S: Real>(a: &mut [S], b: &mut [S], scale: &mut [S]) -> Result<(), S
         return Err(Singular::NotFinite);
     }
     for (row, scale) in a.chunks_exact(n).zip(scale.iter_mut()) {
-        *scale = row[1..].iter().fold(row[0].abs(), |m, v| m.larger(v.abs()));
+        *scale = row[1..].iter().fold(row[0].abs(), |m, v| m.max(v.abs()));
     }
     for k in 0..n {
         for i in k + 1..n {

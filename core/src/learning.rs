@@ -306,7 +306,7 @@ where
             self.turn_back();
         }
         lesson.relative_variance = told.relative_variance;
-        self.lessons = (self.lessons + S::one()).smaller(self.window);
+        self.lessons = (self.lessons + S::one()).min(self.window);
         let square = innovation * innovation / told.relative_variance;
         self.noise += (square - self.noise) / self.lessons;
         lesson.projected = self.hold();
@@ -356,7 +356,7 @@ where
         // The product with the scale may round across the bound.
         let [low, high] = &self.bounds;
         for (value, (low, high)) in self.theta.iter_mut().zip(low.iter().zip(high.iter())) {
-            *value = value.held(*low, *high);
+            *value = value.clamp(*low, *high);
         }
         projected
     }

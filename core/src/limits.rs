@@ -2,7 +2,7 @@
 
 use crate::Real;
 
-/// Holds signals within a magnitude and a rate, sample by sample.
+/// Clamps signals to a magnitude and a rate, sample by sample.
 ///
 /// ```text
 /// c = min(max(u, -m), m)          u_k = min(max(c, u_(k-1) - r T), u_(k-1) + r T)
@@ -25,7 +25,7 @@ use crate::Real;
 /// use loopsight_core::Limits;
 /// let mut limits = Limits::new([12.0], [100.0], [0.0]); // ±12 V, 100 V/s
 /// let mut voltage = [20.0];
-/// assert!(limits.hold(0.01, &mut voltage));
+/// assert!(limits.clamp(0.01, &mut voltage));
 /// assert_eq!(voltage, [1.0]);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -45,9 +45,9 @@ impl<B> Limits<B> {
         }
     }
 
-    /// Holds `values`, `period` s after the last ones; true when one of them was changed. A value
-    /// that is no number is let through: a driver has to see and refuse it.
-    pub fn hold<S: Real>(&mut self, period: S, values: &mut [S]) -> bool
+    /// Clamps `values`, `period` s after the last ones; true when one of them was changed. A value that is
+    /// not a number is let through: a driver has to see and refuse it.
+    pub fn clamp<S: Real>(&mut self, period: S, values: &mut [S]) -> bool
     where
         B: AsRef<[S]> + AsMut<[S]>,
     {
@@ -59,8 +59,8 @@ impl<B> Limits<B> {
                 continue;
             }
             let step = *rate * period;
-            let within = value.held(-*magnitude, *magnitude);
-            let held = within.held(*last - step, *last + step);
+            let within = value.clamp(-*magnitude, *magnitude);
+            let held = within.clamp(*last - step, *last + step);
             changed |= held != *value;
             *value = held;
             *last = held;
@@ -97,7 +97,7 @@ mod tests {
             let mut before = 0.0;
             for want in wanted {
                 let mut value = [want];
-                let changed = limits.hold(0.01, &mut value);
+                let changed = limits.clamp(0.01, &mut value);
                 let step = rate * 0.01 * (1.0 + 1e-5) + 1e-5;
                 prop_assert!(value[0].abs() <= magnitude && (value[0] - before).abs() <= step);
                 prop_assert_eq!(changed, value[0] != want);
@@ -114,7 +114,7 @@ mod tests {
         let free = f64::INFINITY;
         let mut limits = Limits::new(vec![free, 2.0], vec![free, free], vec![0.0, 0.0]);
         let mut values = [1e300, f64::NAN];
-        assert!(!limits.hold(0.01, &mut values));
+        assert!(!limits.clamp(0.01, &mut values));
         assert!(values[0] == 1e300 && values[1].is_nan());
         limits.start(&[0.0, 1.0]);
         assert_eq!(

@@ -69,18 +69,18 @@ pub trait Real:
     }
 
     /// The larger of the two; `self` when either is NaN.
-    fn larger(self, other: Self) -> Self {
+    fn max(self, other: Self) -> Self {
         if other > self { other } else { self }
     }
 
     /// The smaller of the two; `self` when either is NaN.
-    fn smaller(self, other: Self) -> Self {
+    fn min(self, other: Self) -> Self {
         if other < self { other } else { self }
     }
 
-    /// Held within `[low, high]`.
-    fn held(self, low: Self, high: Self) -> Self {
-        self.larger(low).smaller(high)
+    /// Within `[low, high]`; NaN stays NaN.
+    fn clamp(self, low: Self, high: Self) -> Self {
+        self.max(low).min(high)
     }
 
     /// Neither infinite nor NaN.

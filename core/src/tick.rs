@@ -346,7 +346,7 @@ where
                 *to = *from;
             }
             if let Some(limits) = limits {
-                limits.hold(tick.period, wanted.as_mut());
+                limits.clamp(tick.period, wanted.as_mut());
             }
         }
         // Until its step a controller with references of its own has those of the last one.
@@ -393,7 +393,7 @@ where
             *to = *from;
         }
         if let Some(limits) = &mut self.input_limits {
-            self.outcome.saturated |= limits.hold(tick.period, self.limited.as_mut());
+            self.outcome.saturated |= limits.clamp(tick.period, self.limited.as_mut());
         }
         self.driver
             .write(self.limited.as_ref(), self.applied.as_mut())

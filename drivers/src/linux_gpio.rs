@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use board::{Board, Plan};
 use bridge::CharacterDevices;
-pub use settings::{BridgeKind, Line, Motor, SupplySetting};
+pub use settings::{BridgeKind, GpioLine, Motor, SupplySetting};
 
 /// Motors and encoders of a board that runs Linux: pins of the kernel's GPIO character devices, PWM
 /// outputs of `/sys/class/pwm`, quadrature counters of `/sys/bus/counter`.

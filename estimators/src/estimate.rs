@@ -39,7 +39,7 @@ where
 
     /// The covariance as in the beginning.
     pub(crate) fn restart(&mut self) {
-        self.factor.restart(self.initial.smaller(self.cap));
+        self.factor.restart(self.initial.min(self.cap));
     }
 
     /// `y - φᵀθ`.

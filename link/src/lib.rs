@@ -1,14 +1,36 @@
 //! What a host and a robot say to each other over a serial line: messages, frames, a handshake.
 //!
+//! [`encode`] makes a frame of a message. A [`Decoder`] takes bytes as they come and finds the messages in them:
+//!
+//! ```
+//! use loopsight_link::{Decoder, Hello, LONGEST, Request, VERSION, encode};
+//!
+//! let hello = Request::Hello(Hello { version: VERSION, session: 7 });
+//! let mut frame = [0; LONGEST];
+//! let length = encode(&hello, &mut frame)?;
+//!
+//! let mut decoder = Decoder::default();
+//! let mut heard = frame[..length].iter().filter_map(|byte| decoder.take(*byte));
+//! assert_eq!(heard.next(), Some(Ok(hello)));
+//!
+//! // A bit that the line flips is noticed: nothing is taken for a message.
+//! frame[2] ^= 0b100;
+//! let mut heard = frame[..length].iter().filter_map(|byte| decoder.take::<Request>(*byte));
+//! assert!(heard.all(|message| message.is_err()));
+//! # Ok::<(), loopsight_link::FrameError>(())
+//! ```
+//!
+//! **Frames.**
+//!
 //! ```text
 //! frame = COBS(postcard(message) + CRC-32C) + 0x00
 //! ```
 //!
-//! A zero byte ends every frame and occurs nowhere else, so whoever joins in the middle, or lost
-//! bytes, is in step again with the next frame. COBS itself notices no flipped bit; the sum does, and
-//! nothing whose sum is wrong is ever looked at.
+//! A zero byte ends every frame and occurs nowhere else. Whoever joins in the middle, or lost bytes, is in step
+//! again with the next frame. COBS notices no flipped bit; the checksum does. A frame whose checksum is wrong is
+//! dropped.
 //!
-//! **Conversation.** Each side speaks when spoken to, but for what a robot has to say of itself.
+//! **Conversation.** Each side speaks when spoken to. Only a robot with sensors of its own speaks by itself.
 //!
 //! ```text
 //! host                                    robot
@@ -22,18 +44,18 @@
 //!                                 ◄──     Stopped { session, tick, reason }
 //! ```
 //!
-//! A robot without sensors is measured by its host, and answers each step. A robot with motors and encoders
-//! of its own ticks by its own timer from the first step on: steps, without a measurement, tell it the
-//! reference and that its host is there; each of its ticks is said by an Act, with what was measured.
+//! A robot without sensors is measured by its host, and answers each step. A robot with motors and encoders of
+//! its own ticks by its own timer from the first step on. Its steps carry no measurement: they bring the
+//! reference, and say that the host is there. It reports each of its ticks in an [`Act`], with what it measured.
 //!
-//! The host draws a session's number at random. What carries another one than that of the last
-//! greeting is answered with a stop: so each side notices when the other was started anew. [`Hello`] is
-//! the same in all versions.
+//! The host draws the number of a session at random. A message with another number than that of the last
+//! greeting is answered with a stop, so each side notices when the other was restarted. [`Hello`] is the same in
+//! all versions.
 //!
-//! Numbers of a robot's loop are `f32`; they travel bit by bit. Units are SI; times of the line are
-//! whole microseconds.
+//! The numbers of a robot's loop are `f32`, sent bit by bit. Units are SI. Ages of measurements are whole
+//! microseconds.
 //!
-//! No `std`, no allocator.
+//! This crate has no features. It needs neither `std` nor an allocator.
 
 #![no_std]
 

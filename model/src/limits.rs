@@ -91,10 +91,10 @@ mod tests {
             built("voltage_left = { magnitude = 6.0 }\nspeed = { magnitude = 0.3, rate = 1.0 }\n")
                 .unwrap();
         let mut voltages = [20.0, 20.0];
-        assert!(inputs.unwrap().hold(0.01, &mut voltages));
+        assert!(inputs.unwrap().clamp(0.01, &mut voltages));
         assert_eq!(voltages, [20.0, 6.0]);
         let mut speed = [0.5];
-        assert!(references.unwrap().hold(0.1, &mut speed));
+        assert!(references.unwrap().clamp(0.1, &mut speed));
         assert_eq!(speed, [0.1]);
         assert_eq!(built("").unwrap(), (None, None));
     }

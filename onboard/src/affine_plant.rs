@@ -57,7 +57,7 @@ impl<R: Parts> AffineModel<R::Scalar> for AffinePlant<R> {
         let towards = PerInput::<R>::from_fn(|i| {
             let (band, way) = (self.bands[i], self.aim[i] - y[i]);
             if way.abs() > band {
-                y[i] + way.held(-band, band)
+                y[i] + way.clamp(-band, band)
             } else {
                 self.aim[i]
             }

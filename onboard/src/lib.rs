@@ -1,12 +1,13 @@
-//! The loop aboard a robot: plant, effects, learning and control law in fixed sizes, in `f32`, without `std`
-//! and without an allocator; and the conversation that configures, runs and stops it.
+//! The adaptive loop aboard a robot: plant, effects, learning and control law in fixed sizes, in `f32`, without
+//! `std` and without an allocator. And the conversation that configures, runs and stops it.
 //!
-//! It is the same loop as on a desk: [`loopsight_core::Loop`] with [`loopsight_estimators::Rls`] under
-//! [`loopsight_core::learning::Guarded`] and [`loopsight_controllers::FeedbackLinearizingPi`], over the same
-//! source of every plant and effect. What a host does by probing a composed model is done here with a plant's
-//! [`loopsight_core::ControlAffine`] view, so that it fits a microcontroller.
+//! It is the loop of a desk: [`loopsight_core::Loop`] with an estimator under
+//! [`loopsight_core::learning::Guarded`] and a control law, over the same source of every plant and effect. A host
+//! probes a composed model at run time. Here a plant's [`loopsight_core::ControlAffine`] view does that work, so that
+//! it fits a microcontroller.
 //!
-//! Nothing here knows a board. What a board adds is a serial line, a timer and motors:
+//! What is compiled in is listed once, by [`aboard!`]. The list is a type; [`Twil`] is the library's own. A board adds a
+//! serial line, a timer and motors:
 //!
 //! ```text
 //! bytes from the line ──► Session::take ──► replies, to the line
@@ -15,7 +16,29 @@
 //! Session::output     ──► motors; none: at rest
 //! ```
 //!
-//! On a host the same [`Session`] is the twin that a firmware is held against, digit for digit.
+//! ```
+//! use loopsight_link::{Hello, LONGEST, Reply, Request, VERSION, encode};
+//! use loopsight_onboard::{Session, Twil};
+//!
+//! let mut robot = Session::<Twil, _>::new(10_000, ());
+//! let mut frame = [0; LONGEST];
+//! let hello = Request::Hello(Hello { version: VERSION, session: 7 });
+//! let length = encode(&hello, &mut frame)?;
+//! let mut said = Vec::new();
+//! for byte in &frame[..length] {
+//!     robot.take(*byte, &mut |reply| said.push(reply.clone()));
+//! }
+//! assert!(matches!(&said[..], [Reply::Hello(welcome)] if welcome.plant == "ddmr"));
+//! assert!(robot.output().is_none(), "at rest until it is configured");
+//! # Ok::<(), loopsight_link::FrameError>(())
+//! ```
+//!
+//! `examples/twil-firmware` in the repository is a whole firmware. On a host the same [`Session`] is its twin: both
+//! give the same commands and parameters, digit for digit.
+//!
+//! | feature | what it adds |
+//! |---|---|
+//! | `std` (default) | the host's end of the line: the controller `aboard` and the driver `serial` of a loop file, and `send` |
 
 #![cfg_attr(not(feature = "std"), no_std)]
 
@@ -44,7 +67,7 @@ pub use learner::Learner;
 pub use loopsight_link::Attachment;
 pub use parts::{Parts, PerEffort, PerInput, PerParameter, PerRow, PerState, Twil};
 pub use port::{Port, Prompted};
-pub use robot::{Done, Robot};
+pub use robot::Robot;
 pub use session::{Meter, Sensors, Session};
 
 /// What [`aboard!`] needs.

@@ -29,12 +29,12 @@ impl<S: Real, A: Array<S>> Default for Port<S, A> {
     }
 }
 
-impl<S: Real, A: Array<S> + Send> Driver<S> for Port<S, A> {
+impl<S: Real, A: Array<S> + Copy + Send> Driver<S> for Port<S, A> {
     type Error = DriverFault;
 
     fn read(&mut self, measured: &mut [S]) -> Result<Sample<S>, DriverFault> {
-        for (to, from) in measured.iter_mut().zip(self.measured.as_ref()) {
-            *to = *from;
+        for (to, from) in measured.iter_mut().zip(self.measured) {
+            *to = from;
         }
         // Times are those of the host: aboard, one period follows the other.
         Ok(Sample {
@@ -49,7 +49,7 @@ impl<S: Real, A: Array<S> + Send> Driver<S> for Port<S, A> {
         }
         let own = self.applied.as_mut().iter_mut();
         for ((own, to), from) in own.zip(applied).zip(command) {
-            *own = from.held(-self.most, self.most);
+            *own = from.clamp(-self.most, self.most);
             *to = *own;
         }
         Ok(())

@@ -24,15 +24,6 @@ type Inner<R> = Loop<
     PerInput<R>,
 >;
 
-/// What one tick came to; `A` is the array `[f32; N]`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Done<A> {
-    /// What the motors get.
-    pub applied: A,
-    /// What the control law says of it.
-    pub outcome: Command,
-}
-
 impl<R: Parts<Scalar = f32>> Robot<R> {
     /// The loop of `configuration`, `period` in s.
     ///
@@ -75,20 +66,18 @@ impl<R: Parts<Scalar = f32>> Robot<R> {
         Ok(())
     }
 
-    /// One tick. `None` where there is no command: then the motors are at rest.
+    /// One tick: what the control law says of its command. [`Robot::applied`] is what the motors get.
+    ///
+    /// `None` where there is no command: then the motors are at rest.
     pub fn tick(
         &mut self,
         measured: PerInput<R>,
         fresh: bool,
         reference: &[f32],
-    ) -> Option<Done<PerInput<R>>> {
+    ) -> Option<Command> {
         self.inner.driver.measured = measured;
         self.inner.driver.fresh = fresh;
-        let outcome = self.inner.tick(reference).ok()?.outcome;
-        Some(Done {
-            applied: self.inner.driver.applied,
-            outcome,
-        })
+        Some(self.inner.tick(reference).ok()?.outcome)
     }
 
     /// From now on the supply gives inputs up to this magnitude.

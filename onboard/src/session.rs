@@ -308,19 +308,19 @@ impl<R: Parts<Scalar = f32>, M: Meter> Session<R, M> {
         run.watch
             .turned::<R::Plant>(applied, &measured, parameters)?;
         self.meter.start();
-        let done = run.robot.tick(measured, fresh, reference.as_ref());
+        let outcome = run.robot.tick(measured, fresh, reference.as_ref());
         let cost = core::mem::replace(&mut self.cost, self.meter.stop());
-        let done = done.ok_or(Reason::NoCommand)?;
+        let outcome = outcome.ok_or(Reason::NoCommand)?;
         run.begun = true;
         let tick = self.tick;
         self.tick = tick.wrapping_add(1);
         Ok(Act {
             session: self.session,
             tick,
-            command: done.applied.into_iter().collect(),
+            command: run.robot.applied().into_iter().collect(),
             parameters: run.robot.parameters().into_iter().collect(),
-            saturated: done.outcome.saturated,
-            held: done.outcome.held,
+            saturated: outcome.saturated,
+            held: outcome.held,
             learned: run.robot.learned(),
             cost,
             sensed: None,

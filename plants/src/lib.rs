@@ -1,7 +1,55 @@
-//! Plants, one file each, and the physical effects that can be added to them in [`effects`].
+//! Plants, and the physical effects that a plain model of them may lack.
 //!
-//! A plant or an effect declared here is known everywhere (TOML, listings, fits, reports) without
-//! anything else being touched. A program that wants them says `use loopsight_plants as _;`.
+//! A **plant** is a machine: its states, inputs and parameters as data, and its equations. An **effect** is
+//! physics that is added at a channel of a plant: friction at a wheel, a delay at an input, a lag at a sensor.
+//! Each is one file. It begins with the equation, the symbols with their units, the assumptions and the
+//! source.
+//!
+//! | plant | what |
+//! |---|---|
+//! | [`Ddmr`] | a differential-drive robot with two motors |
+//! | [`DcAxis`] | a DC motor with a load, turning or on a slide |
+//! | [`Arm`] | a joint that lifts a load |
+//! | [`ServoAxis`] | a slide, seen through its position control |
+//! | [`Oscillator`] | a mass on a spring |
+//! | [`TankPair`] | two tanks, one emptying into the other |
+//! | [`CartPole`] | a pole on a cart |
+//!
+//! The effects are in [`effects`].
+//!
+//! The equations are generic over the scalar. The same lines run on a microcontroller in `f32`, in a
+//! simulation in `f64`, and in a fit with exact derivatives. Here a robot with dry friction drives for a second:
+//!
+//! ```
+//! use loopsight_core::{Effect, Plant, Reading, Role, rk4_step};
+//! use loopsight_plants::Ddmr;
+//! use loopsight_plants::effects::CoulombFriction;
+//!
+//! // K_A … K_F, half track and wheel radius, as `Ddmr::META` declares them.
+//! let p = [-15.146, 0.005, 0.136, -9.573, -3.945, 0.656, 0.131, 0.05];
+//! let volts = [6.0, 5.0];
+//! let mut x = [0.0f64; 6];
+//! for _ in 0..400 {
+//!     rk4_step(&mut x, 0.0025, |x| {
+//!         let friction = |wheel: usize| {
+//!             let speed = Ddmr::output(wheel, x, &volts, &p);
+//!             let at = Reading::nothing().with(Role::Flow, &speed);
+//!             CoulombFriction::contribution(&at, &[], &[0.9, 0.3])
+//!         };
+//!         let w = [friction(0), friction(1), 0.0, 0.0];
+//!         Ddmr::derivative(x, &volts, &w, &p)
+//!     });
+//! }
+//! let [speed, yaw_rate, ..] = x;
+//! assert!((speed - 0.083).abs() < 1e-3 && yaw_rate > 0.06);
+//! ```
+//!
+//! | feature | what it adds |
+//! |---|---|
+//! | `std` (default) | each part is in the registry of `loopsight-model`: it has a table in TOML, and listings, fits, diagnoses and pages know it |
+//!
+//! Without `std` nothing here allocates. A program that wants the parts in its TOML says
+//! `use loopsight_plants as _;`, unless it depends on the crate `loopsight`, which does.
 
 #![cfg_attr(not(feature = "std"), no_std)]
 

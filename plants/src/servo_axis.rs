@@ -291,7 +291,7 @@ impl Plant for ServoAxis {
 /// What the controller puts out.
 fn voltage<S: Real>(x: &[S; 4], u: &[S; 2], p: &[S; 8]) -> S {
     let [_, _, k_p, k_v, _, limit, _, _] = *p;
-    (k_v * (k_p * (u[0] - x[0]) - x[2]) + u[1]).held(-limit, limit)
+    (k_v * (k_p * (u[0] - x[0]) - x[2]) + u[1]).clamp(-limit, limit)
 }
 
 declare_plant!(ServoAxis, "servo_axis");

@@ -116,7 +116,7 @@ where
             return None;
         }
         if self.samples < self.window {
-            self.samples = (self.samples + S::one()).smaller(self.window);
+            self.samples = (self.samples + S::one()).min(self.window);
             self.share = S::one() / self.samples;
         }
         let share = self.share;
@@ -142,7 +142,7 @@ where
         let (own, other, off) = (a[p * n + p], a[q * n + q], a[q * n + p]);
         let apart = (own - floor) * (other - floor) < S::zero();
         let correlated = S::of(if apart { APART } else { ALIKE });
-        off * off > correlated * (own.larger(least) * other.larger(least))
+        off * off > correlated * (own.max(least) * other.max(least))
     }
 
     /// Turns pairs of directions that correlate, each once; true where one of them turned far. The loops are
@@ -195,8 +195,8 @@ where
         };
         let sine = tangent * cosine;
         let turn = |x: S, y: S| (cosine * x - sine * y, sine * x + cosine * y);
-        a[p * n + p] = (own - tangent * off).larger(S::zero());
-        a[q * n + q] = (other + tangent * off).larger(S::zero());
+        a[p * n + p] = (own - tangent * off).max(S::zero());
+        a[q * n + q] = (other + tangent * off).max(S::zero());
         a[q * n + p] = S::zero();
         for k in 0..p {
             let (to_p, to_q) = (p * n + k, q * n + k);
@@ -300,15 +300,13 @@ where
     /// `√m` of the least excited direction.
     pub(super) fn least(&self) -> S {
         let n = self.seen.len();
-        (1..n)
-            .fold(self.mean(0), |a, i| a.smaller(self.mean(i)))
-            .sqrt()
+        (1..n).fold(self.mean(0), |a, i| a.min(self.mean(i))).sqrt()
     }
 
     /// `√(m_min/m_max)`; 0 where nothing is excited.
     pub(super) fn balance(&self) -> S {
         let n = self.seen.len();
-        let greatest = (0..n).fold(S::zero(), |a, i| a.larger(self.mean(i)));
+        let greatest = (0..n).fold(S::zero(), |a, i| a.max(self.mean(i)));
         if greatest > S::zero() {
             self.least() / greatest.sqrt()
         } else {

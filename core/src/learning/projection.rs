@@ -66,7 +66,7 @@ pub(super) fn into_box<S: Real>(
         }
     }
     for i in 0..n {
-        theta[i] = theta[i].held(low[i], high[i]);
+        theta[i] = theta[i].clamp(low[i], high[i]);
     }
     true
 }

@@ -117,7 +117,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
         window: S,
         calm: bool,
     ) {
-        let share = (seen.tick.period / window).smaller(S::one());
+        let share = (seen.tick.period / window).min(S::one());
         if self.age == S::zero() {
             // There is no rate before the second sample.
             for (last, y) in self.last.as_mut().iter_mut().zip(seen.measured) {
@@ -127,14 +127,14 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
         self.age += seen.tick.period;
         self.taught_now = false;
         // A plain mean until there is a long time to look back on.
-        let slow = (share / S::of(USUAL)).larger(seen.tick.period / self.age);
+        let slow = (share / S::of(USUAL)).max(seen.tick.period / self.age);
         for row in 0..self.now.as_ref().len() {
             if let Some(y) = seen.measured.get(row) {
                 let rate = (*y - self.last.as_ref()[row]) / seen.tick.period;
                 blend(&mut self.rate.as_mut()[row], rate * rate, share);
                 self.last.as_mut()[row] = *y;
                 let peak = &mut self.peak.as_mut()[row];
-                *peak = (*peak * (S::one() - share / S::of(USUAL))).larger(self.rate.as_ref()[row]);
+                *peak = (*peak * (S::one() - share / S::of(USUAL))).max(self.rate.as_ref()[row]);
             }
             let Some(innovation) = observer.innovation(row) else {
                 continue;
@@ -146,7 +146,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
             blend(&mut self.now.as_mut()[row], e * e, share);
             blend(&mut self.past.as_mut()[row], g * g, share);
             if calm {
-                let better = self.now.as_ref()[row].smaller(self.past.as_ref()[row]);
+                let better = self.now.as_ref()[row].min(self.past.as_ref()[row]);
                 blend(&mut self.usual.as_mut()[row], better, slow);
             }
         }
@@ -168,8 +168,8 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
     /// How many times as large as usual the innovation of the better model is, where it is largest.
     pub(super) fn unusual(&self) -> Option<(usize, S)> {
         self.largest(|models, row| {
-            let better = models.now.as_ref()[row].smaller(models.past.as_ref()[row]);
-            better / models.usual.as_ref()[row].larger(models.floor(row, MOVING))
+            let better = models.now.as_ref()[row].min(models.past.as_ref()[row]);
+            better / models.usual.as_ref()[row].max(models.floor(row, MOVING))
         })
     }
 

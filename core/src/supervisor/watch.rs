@@ -169,7 +169,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
             };
             let (is, wanted) = (speed(measured), speed(self.reference.as_ref()));
             let largest = &mut self.largest_speed.as_mut()[i];
-            *largest = largest.larger(wanted.abs());
+            *largest = largest.max(wanted.abs());
             let last = core::mem::replace(&mut self.last.as_mut()[i], is);
             let stands = (is - last).abs() <= *largest * S::of(STILL);
             let matters = wanted.abs() > *largest * S::of(MATTERS);
@@ -199,7 +199,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
                 continue;
             };
             let largest = &mut self.largest_reference.as_mut()[i];
-            *largest = largest.larger(r.abs());
+            *largest = largest.max(r.abs());
             let given = self.tracking.as_ref()[i];
             let limit = if given.is_finite() {
                 given
@@ -211,7 +211,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
             *clock = if error > limit && limit > S::zero() {
                 *clock + seen.tick.period
             } else {
-                (*clock - seen.tick.period).larger(S::zero())
+                (*clock - seen.tick.period).max(S::zero())
             };
             if *clock > self.thresholds.tracking_for && found.is_none() {
                 found = Some((Cause::Tracking(i), error, limit));

@@ -20,7 +20,7 @@ impl Driver<f32> for Integrator {
         Ok(Sample { time, fresh })
     }
     fn write(&mut self, command: &[f32], applied: &mut [f32]) -> Result<(), DriverFault> {
-        self.u = command[0].held(-1.0, 1.0);
+        self.u = command[0].clamp(-1.0, 1.0);
         applied[0] = self.u;
         Ok(())
     }
@@ -80,7 +80,7 @@ struct Quotient {
 
 impl Observer<f32> for Quotient {
     fn observe(&mut self, seen: &Observation<'_, f32>) {
-        assert_eq!(seen.applied[0], seen.command[0].held(-1.0, 1.0));
+        assert_eq!(seen.applied[0], seen.command[0].clamp(-1.0, 1.0));
         assert_eq!(seen.outcome.saturated, seen.command[0].abs() > 1.0);
         assert!(seen.tick.index > 0 && seen.sample.fresh);
         if seen.outcome.saturated {

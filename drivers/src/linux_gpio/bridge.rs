@@ -7,7 +7,7 @@ use gpiocdev_embedded_hal as gpiocdev;
 
 use super::file::FileError;
 use super::pwm::SysfsPwm;
-use super::settings::Line;
+use super::settings::GpioLine;
 use crate::twil_motor::{Bridge, BridgeError, LockedAntiphase, SignMagnitude};
 
 /// Opens lines as outputs.
@@ -42,7 +42,7 @@ impl<P: OutputPin> BoardPin<P> {
     pub(crate) fn open<L: Lines<Pin = P>>(
         lines: &L,
         chip: &str,
-        line: Option<&Line>,
+        line: Option<&GpioLine>,
     ) -> Result<Self, String> {
         let Some(line) = line else {
             return Ok(Self {

@@ -17,7 +17,7 @@ use crate::twil_motor::WheelSettings;
     untagged,
     expecting = "expected a line number or a table `{ line, active_low }`"
 )]
-pub enum Line {
+pub enum GpioLine {
     /// Acts when it is high.
     High(u32),
     /// Acts when it is high or low.
@@ -29,7 +29,7 @@ pub enum Line {
     },
 }
 
-impl Line {
+impl GpioLine {
     pub(crate) fn number(&self) -> u32 {
         match self {
             Self::High(line) | Self::Table { line, .. } => *line,
@@ -86,13 +86,13 @@ pub struct Motor {
     pub bridge: BridgeKind,
     /// Direction pin, of a sign–magnitude bridge.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub direction: Option<Line>,
+    pub direction: Option<GpioLine>,
     /// Enable pin.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub enable: Option<Line>,
+    pub enable: Option<GpioLine>,
     /// Brake pin.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub brake: Option<Line>,
+    pub brake: Option<GpioLine>,
     /// Device and count of the encoder.
     pub counter: [u32; 2],
     /// The shaft that the encoder counts, as in the `of` of the model's sensors.

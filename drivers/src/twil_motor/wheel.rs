@@ -107,12 +107,12 @@ impl<S: Real, B: Bridge<S>, Q: Quadrature> Wheel<S, B, Q> {
         period: S,
     ) -> Result<S, WheelError<B::Error, Q::Error>> {
         let mut held = [volts];
-        self.limits.hold(period, &mut held);
+        self.limits.clamp(period, &mut held);
         let wanted = direction(held[0]);
         if wanted == -self.direction && wanted != 0 && self.rested < self.settings.dead_ticks {
             held[0] = S::zero();
         }
-        let [volts] = held.map(|v| v.held(-supply, supply));
+        let [volts] = held.map(|v| v.clamp(-supply, supply));
         match direction(volts) {
             0 => self.rested = self.rested.saturating_add(1),
             now => (self.direction, self.rested) = (now, 0),

@@ -45,7 +45,7 @@ impl<S: Real> Memory<S> {
         let share = square / (self.length * self.square);
         // Without any noise the share is no number: then there is nothing new either.
         if share.is_finite() {
-            (S::one() - share).larger(self.least)
+            (S::one() - share).max(self.least)
         } else {
             S::one()
         }
@@ -59,8 +59,8 @@ impl<S: Real> Memory<S> {
         } else {
             S::of(9.0) * self.square
         };
-        self.samples = (self.samples + S::one()).smaller(ten * self.length);
-        self.square += (square.smaller(limit) - self.square) / self.samples;
+        self.samples = (self.samples + S::one()).min(ten * self.length);
+        self.square += (square.min(limit) - self.square) / self.samples;
     }
 }
 

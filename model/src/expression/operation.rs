@@ -117,8 +117,8 @@ impl Binary {
             Binary::Multiply => a * b,
             Binary::Divide => a / b,
             Binary::Power => a.powf(b),
-            Binary::Min => a.smaller(b),
-            Binary::Max => a.larger(b),
+            Binary::Min => a.min(b),
+            Binary::Max => a.max(b),
             Binary::Atan2 => a.atan2(b),
         }
     }

@@ -136,7 +136,7 @@ declare_effect!(Backlash, "backlash");
 /// `z` beyond the gap, zero within; by the play it has its derivative at zero too.
 fn engaged<S: Real>(z: S, play: S) -> S {
     let half = play.times(S::of(0.5));
-    z - z.held(-half, half)
+    z - z.clamp(-half, half)
 }
 
 #[cfg(test)]

@@ -46,7 +46,7 @@ impl Effect for DeadZone {
 
     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 1]) -> S {
         // Written so that a threshold of zero has its derivative, -sign(u).
-        -at.nominal.held(-p[0], p[0])
+        -at.nominal.clamp(-p[0], p[0])
     }
 }
 

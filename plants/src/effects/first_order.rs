@@ -16,12 +16,12 @@ const SHORTEST: f64 = 0.004;
 
 /// What the lag of time constant `lag` adds to the signal `u`, with its state `z`.
 pub(super) fn contribution<S: Real>(u: S, z: S, lag: S) -> S {
-    (z - u) * lag / lag.larger(S::of(SHORTEST))
+    (z - u) * lag / lag.max(S::of(SHORTEST))
 }
 
 /// The rate of its state.
 pub(super) fn rate<S: Real>(u: S, z: S, lag: S) -> S {
-    (u - z) / lag.larger(S::of(SHORTEST))
+    (u - z) / lag.max(S::of(SHORTEST))
 }
 
 #[cfg(test)]

@@ -43,7 +43,7 @@ impl Effect for InputSaturation {
     };
 
     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 1]) -> S {
-        at.nominal.held(-p[0], p[0]) - at.nominal
+        at.nominal.clamp(-p[0], p[0]) - at.nominal
     }
 }
 

@@ -148,7 +148,7 @@ fn needed<S: Real>(at: &Reading<'_, S>, z: &[S; 2], p: &[S; 4]) -> S {
 fn taken<S: Real>(needed: S, s: S, p: &[S; 4]) -> S {
     let [limit, wheel, sliding, fall] = *p;
     let most = limit * (sliding + (S::one() - sliding) / (S::one() + s.abs() / fall));
-    (needed + (wheel.times(S::of(GRIP)) - S::one()) * s).held(-most, most)
+    (needed + (wheel.times(S::of(GRIP)) - S::one()) * s).clamp(-most, most)
 }
 
 #[cfg(test)]

@@ -57,11 +57,11 @@ fn locked_antiphase_begins_in_the_middle_with_its_bridge_open() {
         motor.bridge = BridgeKind::LockedAntiphase;
         motor.direction = None;
         let line = motor.enable.as_ref().unwrap().number();
-        motor.enable = Some(Line::Table {
+        motor.enable = Some(GpioLine::Table {
             line,
             active_low: true,
         });
-        motor.brake = Some(Line::High(line + 1));
+        motor.brake = Some(GpioLine::High(line + 1));
     }
     let mut board = fake.board(&settings);
     board.read(&mut [0.0; 2]).unwrap();

@@ -150,7 +150,7 @@ pub fn start(
 impl<W: Wheels<f32> + Send> Motors<W> {
     /// What encoders and supply say after so many periods, of which there should be one; `None` where something
     /// failed since the last time.
-    pub fn sense(&mut self, periods: u32) -> Option<Sensors<2>> {
+    pub fn sense(&mut self, periods: u32) -> Option<Sensors<[f32; 2]>> {
         let sample = self.adc.convert(&self.divider, SampleTime::Cycles_480);
         let supply = 1e-3 * f32::from(self.adc.sample_to_millivolts(sample)) * DIVIDER;
         SUPPLY.store(supply.to_bits(), Ordering::Relaxed);

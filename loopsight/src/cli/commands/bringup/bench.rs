@@ -136,7 +136,7 @@ impl<'m> Bench<'m> {
 
     fn write(&mut self, command: &mut [f64]) -> Result<(), Failure> {
         if let Some(limits) = &mut self.limits {
-            limits.hold(self.period, command);
+            limits.clamp(self.period, command);
         }
         match self.driver.write(command, &mut self.applied) {
             Ok(()) => Ok(()),
