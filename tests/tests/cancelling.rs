@@ -36,14 +36,14 @@ static COUNTING: Mutex<()> = Mutex::new(());
 #[derive(Clone, Copy, Debug)]
 struct Counted;
 
-const INNER: PlantMeta = <DcAxis as Plant<2, 1, 2, 3, 5>>::META;
+const INNER: PlantMeta = <DcAxis as Plant>::META;
 const PARAMETERS: [Parameter; 3] = [
     INNER.parameters[0],
     INNER.parameters[1],
     INNER.parameters[2],
 ];
 
-impl Plant<2, 1, 2, 3, 5> for Counted {
+impl Plant for Counted {
     const META: PlantMeta = PlantMeta {
         id: "counted_axis",
         example: "[plant.counted_axis]\nK_A = -2.0\nK_C = 8.0\n",
@@ -66,7 +66,7 @@ impl Plant<2, 1, 2, 3, 5> for Counted {
     }
 }
 
-declare_plant!(Counted, "counted_axis", <2, 1, 2, 3, 5>);
+declare_plant!(Counted, "counted_axis");
 
 const AXIS: &str = r#"
 [model]
