@@ -170,13 +170,13 @@ fn trace(
             signal.free_run.push(*value);
         }
         if diverged.is_none() && predicted.iter().any(|v| !v.is_finite()) {
-            diverged = Some(run.time[k]);
+            diverged = Some(run.time()[k]);
         }
         work.go_on()
     })?;
     if let Some(time) = diverged {
         return Err(CompareError::Diverged {
-            run: run.name.clone(),
+            run: run.name().to_owned(),
             time,
         });
     }
@@ -205,8 +205,8 @@ fn trace(
         })
         .collect();
     Ok(RunTrace {
-        name: run.name.clone(),
-        time: run.time.clone(),
+        name: run.name().to_owned(),
+        time: run.time().to_vec(),
         inputs,
         signals,
         initial_state: x0.iter().copied().collect(),

@@ -126,7 +126,7 @@ impl<'m> Design<'m> {
             Shape::usual(names.len()).drive(&names, limits.limit, limits.period, HORIZON)?;
         let values = model.values();
         let run = response(model, &values, &drive, work)?;
-        let noise = (0..run.n_measured)
+        let noise = (0..run.n_measured())
             .map(|i| match &model.measured[i].sensor {
                 Sensor::EncoderCounts(encoder) => encoder.noise(limits.period),
                 Sensor::Instantaneous | Sensor::IntervalMean => {
@@ -230,7 +230,7 @@ impl<'m> Design<'m> {
                     .sum::<f64>()
             };
             let least = |i: usize| MOVES * self.noise[i] * (run.len() as f64).sqrt();
-            Ok((0..run.n_measured)
+            Ok((0..run.n_measured())
                 .map(|i| power(i).sqrt() > least(i))
                 .collect())
         };

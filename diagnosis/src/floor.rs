@@ -45,7 +45,7 @@ pub(crate) fn noise(sensor: &Sensor, signal: usize, runs: &[Run]) -> (f64, f64) 
         let step = run.median_period();
         let mut news: Vec<(f64, f64)> = Vec::new();
         for k in 0..run.len() {
-            let (time, y) = (run.time[k], run.sample(k)[signal]);
+            let (time, y) = (run.time()[k], run.sample(k)[signal]);
             tally.add(y, y);
             let Some((before, last)) = news.last().copied() else {
                 if y.is_finite() {
@@ -99,6 +99,8 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use loopsight_model::run::Rows;
+
     use super::*;
 
     /// A sine of amplitude 1 and 2 rad/s, read every 5 ms, new every 20 ms.
@@ -115,14 +117,7 @@ mod tests {
             .map(|(t, y)| (y - (2.0 * (t - 0.0075)).sin()).powi(2))
             .sum::<f64>()
             / f64::from(n);
-        let run = Run {
-            time,
-            inputs: Vec::new(),
-            n_inputs: 0,
-            measured,
-            n_measured: 1,
-            ..Run::default()
-        };
+        let run = Run::new("", time, Rows::default(), Rows::new(1, measured)).unwrap();
         let (noise, _) = noise(&Sensor::Instantaneous, 0, &[run]);
         assert!(
             (noise / left.sqrt() - 1.0).abs() < 0.1,

@@ -35,7 +35,7 @@ impl<'a> Holdout<'a> {
                 .enumerate()
                 .map(|(index, run)| {
                     let block = (run.duration() / 16.0).clamp(BLOCK.0, BLOCK.1);
-                    run.time
+                    run.time()
                         .iter()
                         .map(|t| t < &block || !((t / block) as usize + index).is_multiple_of(4))
                         .collect()

@@ -1,11 +1,10 @@
 //! Whether a model can be simulated from the inputs alone, and what holds it where it cannot.
 
 use std::borrow::Cow;
-use std::sync::Arc;
 
 use loopsight_core::Real;
 use loopsight_model::model::Model;
-use loopsight_model::run::Run;
+use loopsight_model::run::{Rows, Run};
 use loopsight_model::simulate::{Simulator, StateObserver};
 use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::{DMatrix, DVector};
@@ -39,7 +38,7 @@ pub enum Because {
 impl Held {
     /// What was done to `runs`; `None` where they are simulated from the inputs alone.
     pub(crate) fn of(runs: &[Run]) -> Option<Self> {
-        let observer = runs.iter().find_map(|run| run.observer.as_deref())?;
+        let observer = runs.iter().find_map(|run| run.observer())?;
         let horizon = observer.horizon;
         let (because, why) = match observer.doubling {
             Some(time) => (
@@ -104,7 +103,7 @@ pub(crate) fn growth(
     runs: &[Run],
     work: &Work<'_>,
 ) -> Result<Option<Growth>, Cancelled> {
-    if runs.iter().any(|r| r.observer.is_some()) || values.iter().any(|v| !v.is_finite()) {
+    if runs.iter().any(|r| r.observer().is_some()) || values.iter().any(|v| !v.is_finite()) {
         return Ok(None);
     }
     let design = Design::new(model, values, runs);
@@ -120,14 +119,18 @@ pub(crate) fn unstable_at_rest(
     work: &Work<'_>,
 ) -> Result<bool, Cancelled> {
     let (n_inputs, n_measured) = (model.plant.inputs.len(), model.measured.len());
-    let rest = [Run {
-        time: time.to_vec(),
-        inputs: vec![0.0; n_inputs * time.len()],
-        measured: vec![f64::NAN; n_measured * time.len()],
-        n_inputs,
-        n_measured,
-        ..Run::default()
-    }];
+    let rows = |width: usize, value: f64| Rows::new(width, vec![value; width * time.len()]);
+    let rest = Run::new(
+        "",
+        time.to_vec(),
+        rows(n_inputs, 0.0),
+        rows(n_measured, f64::NAN),
+    );
+    // Instants that do not increase are no experiment, and nothing leaves its rest within them.
+    let Ok(rest) = rest else {
+        return Ok(false);
+    };
+    let rest = [rest];
     let design = Design::new(model, values, &rest);
     Ok(design.paths(&rest, work)?.iter().any(unstable))
 }
@@ -158,7 +161,7 @@ pub(crate) fn hold_alike<'r>(
     runs: &[Run],
     work: &Work<'_>,
 ) -> Result<Cow<'r, [Run]>, Cancelled> {
-    let Some(observer) = runs.iter().find_map(|run| run.observer.as_deref()) else {
+    let Some(observer) = runs.iter().find_map(|run| run.observer()) else {
         return Ok(Cow::Borrowed(others));
     };
     let growth = Growth {
@@ -206,7 +209,7 @@ impl<'a> Design<'a> {
         for run in runs {
             let n = run.len().min(LOOKED_AT);
             let fade = FIRST * run.median_period();
-            let mut path = Path::new(&run.time[..n]);
+            let mut path = Path::new(&run.time()[..n]);
             let certain = self.certain(1.0);
             let followed = self.filter(run, n, fade, &certain, work, |step| path.push(step))?;
             if followed.is_some() {
@@ -218,23 +221,22 @@ impl<'a> Design<'a> {
 
     /// None where the filter diverges.
     fn hold(&self, run: &Run, growth: &Growth, work: &Work<'_>) -> Result<Option<Run>, Cancelled> {
-        let mut held = run.clone();
         let horizon = growth.horizon.max(SHORTEST * run.median_period());
         let nx = self.model.n_states();
-        let stride = nx * run.n_measured;
+        let stride = nx * run.n_measured();
         let mut gains = vec![0.0; stride * run.len()];
         let uncertain = self.certain(1.0);
         let warm = run
-            .time
+            .time()
             .iter()
-            .position(|t| t - run.time[0] > 3.0 * horizon)
+            .position(|t| t - run.time()[0] > 3.0 * horizon)
             .unwrap_or(run.len());
         // The initial state is estimated, so the gains begin as they go on.
         let Some(uncertain) = self.filter(run, warm, horizon, &uncertain, work, |_| {})? else {
             return Ok(None);
         };
         let last = self.filter(run, run.len(), horizon, &uncertain, work, |step| {
-            let rows = gains[step.k * stride..].chunks_exact_mut(run.n_measured);
+            let rows = gains[step.k * stride..].chunks_exact_mut(run.n_measured());
             for (row, to) in rows.take(nx).enumerate() {
                 for (column, gain) in to.iter_mut().enumerate() {
                     *gain = step.gain[(row, column)];
@@ -244,15 +246,14 @@ impl<'a> Design<'a> {
         if last.is_none() {
             return Ok(None);
         }
-        held.observer = Some(Arc::new(StateObserver {
+        Ok(Some(run.clone().with_observer(StateObserver {
             gains,
             observed: growth.observed.clone(),
             horizon,
             doubling: growth.doubling,
             stride,
             values: self.values.to_vec(),
-        }));
-        Ok(Some(held))
+        })))
     }
 
     /// Uncertainty of the state before anything is known: many deviations of what is measured.
@@ -314,7 +315,7 @@ impl<'a> Design<'a> {
                     *state = variable(x[i], i.wrapping_sub(first));
                 }
                 simulator.advance_between(
-                    run.time[k] - run.time[0],
+                    run.time()[k] - run.time()[0],
                     run.input(k - 1),
                     run.input(k),
                 );
@@ -335,7 +336,7 @@ impl<'a> Design<'a> {
                     c.row_mut(i).fill(0.0);
                 }
             }
-            p *= (2.0 * (run.time[k] - run.time[k - 1]) / fade).exp();
+            p *= (2.0 * (run.time()[k] - run.time()[k - 1]) / fade).exp();
             let pc = &p * c.transpose();
             let s = &c * &pc + DMatrix::identity(ny, ny);
             let Some(cholesky) = s.clone().cholesky() else {

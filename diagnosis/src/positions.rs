@@ -75,7 +75,7 @@ impl Positions {
         n_measured: usize,
         mut each: impl FnMut(usize, &[S]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let Some(&start) = run.time.first() else {
+        let Some(&start) = run.time().first() else {
             return Ok(());
         };
         let mut predicted = vec![S::zero(); n_measured];
@@ -83,8 +83,8 @@ impl Positions {
         for k in 0..run.len() {
             let mut interval = 0.0;
             if k > 0 {
-                interval = run.time[k] - run.time[k - 1];
-                simulator.advance_between(run.time[k] - start, run.input(k - 1), run.input(k));
+                interval = run.time()[k] - run.time()[k - 1];
+                simulator.advance_between(run.time()[k] - start, run.input(k - 1), run.input(k));
             }
             simulator.measure(&mut predicted);
             each(k, &predicted)?;
@@ -115,7 +115,7 @@ pub(crate) fn run_with<S: HostReal, E>(
 ) -> Result<(), E> {
     match positions {
         // An observer holds the positions as well.
-        Some(positions) if run.observer.is_none() => {
+        Some(positions) if run.observer().is_none() => {
             positions.run(simulator, x0, run, n_measured, each)
         }
         _ => try_follow(simulator, x0, run, |k, outputs, _| each(k, outputs)),

@@ -14,7 +14,7 @@ use crate::progress::{Cancelled, Work};
 /// the runs are held to the measurements all that those say something about. The others start at
 /// zero.
 pub(crate) fn estimated_states(model: &Model, values: &[f64], runs: &[Run]) -> Vec<usize> {
-    let observer = runs.iter().find_map(|run| run.observer.as_deref());
+    let observer = runs.iter().find_map(|run| run.observer());
     observer.map_or_else(
         || model.seen_states(values),
         |observer| observer.observed.clone(),
@@ -237,7 +237,7 @@ impl InitialStates {
 pub(crate) fn residuals(predicted: &[f64], run: &Run) -> DVector<f64> {
     DVector::from_iterator(
         predicted.len(),
-        run.measured
+        run.measured()
             .iter()
             .zip(predicted)
             .map(|(y, p)| if y.is_finite() { y - p } else { 0.0 }),
@@ -291,13 +291,13 @@ pub(crate) fn one_step(
         for (x, c) in next.state_mut().iter_mut().zip(correction.iter()) {
             *x += c;
         }
-        next.advance_between(run.time[k], run.input(k - 1), run.input(k));
+        next.advance_between(run.time()[k], run.input(k - 1), run.input(k));
         next.measure(&mut outputs);
         each(k, &outputs);
-        if let Some(observer) = run.observer.as_deref() {
+        if let Some(observer) = run.observer() {
             free.correct(observer, k - 1, run.sample(k - 1), &before);
         }
-        free.advance_between(run.time[k], run.input(k - 1), run.input(k));
+        free.advance_between(run.time()[k], run.input(k - 1), run.input(k));
     }
     Ok(())
 }

@@ -324,7 +324,7 @@ impl<'a> Problem<'a> {
             let s = sensitivities_with(positions, model, &values, x0, run, by, work)?;
             let residual = residuals(&s.predicted, run);
             for row in 0..residual.len() {
-                let finite = run.measured[row].is_finite();
+                let finite = run.measured()[row].is_finite();
                 let weight = if finite { self.weight(index, row) } else { 0.0 };
                 all[first_row + row] = residual[row] * weight;
                 for column in 0..n_free + n_visible {

@@ -23,18 +23,18 @@ pub(crate) fn for_each_row(
     let mut offset = 0.0;
     for run in runs {
         regression.restart();
-        let mut input = vec![0.0; run.n_inputs];
+        let mut input = vec![0.0; run.n_inputs()];
         let mut last = 0;
         for k in 0..run.len() {
             work.go_on()?;
-            if k > 0 && run.time[k] - run.time[last] < span {
+            if k > 0 && run.time()[k] - run.time()[last] < span {
                 continue;
             }
             // The mean of what was applied since the last sample used.
             input.fill(0.0);
-            let elapsed = run.time[k] - run.time[last];
+            let elapsed = run.time()[k] - run.time()[last];
             for i in last..k {
-                let share = (run.time[i + 1] - run.time[i]) / elapsed;
+                let share = (run.time()[i + 1] - run.time()[i]) / elapsed;
                 let ends = run.input(i).iter().zip(run.input(i + 1));
                 for (index, (mean, (value, next))) in input.iter_mut().zip(ends).enumerate() {
                     *mean += share
@@ -45,10 +45,10 @@ pub(crate) fn for_each_row(
                 }
             }
             last = k;
-            if regression.push(run.time[k], run.sample(k), &input) {
+            if regression.push(run.time()[k], run.sample(k), &input) {
                 for row in 0..regression.len() {
                     let (phi, y) = regression.row(row);
-                    each(row, offset + run.time[k], phi, y);
+                    each(row, offset + run.time()[k], phi, y);
                 }
             }
         }

@@ -10,7 +10,7 @@ const LEAST_MOTION: f64 = 2.0;
 
 /// Whether a measured signal changes in a run.
 fn moves(run: &Run) -> bool {
-    (0..run.n_measured).any(|i| {
+    (0..run.n_measured()).any(|i| {
         let mut values = (0..run.len())
             .map(|k| run.sample(k)[i])
             .filter(|v| v.is_finite());

@@ -107,7 +107,7 @@ fn collect(
         .map(|(i, m)| {
             let of_run = |run: &Run| {
                 let values: Vec<f64> = (0..run.len()).map(|k| run.sample(k)[i]).collect();
-                speed(&run.time, &values, Motion::of(m.signal.unit))
+                speed(run.time(), &values, Motion::of(m.signal.unit))
             };
             runs.iter().map(of_run).collect()
         })
@@ -134,7 +134,7 @@ fn collect(
                 let last = turned[i].partition_point(|change| *change <= k);
                 let since = last
                     .checked_sub(1)
-                    .map(|last| run.time[k] - run.time[turned[i][last]]);
+                    .map(|last| run.time()[k] - run.time()[turned[i][last]]);
                 samples
                     .after_change
                     .push(since.is_some_and(|s| s < AFTER_CHANGE * (1.0 + 1e-9)));
@@ -257,7 +257,7 @@ fn by_run(name: &str, runs: &[Run], samples: &Samples) -> Option<Said> {
         })
         .max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
     (error > TELLING * part && error > 0.3).then(|| {
-        let called = match runs[worst].name.as_str() {
+        let called = match runs[worst].name() {
             "" => format!("{}", worst + 1),
             called => called.to_owned(),
         };

@@ -2,7 +2,7 @@
 
 use loopsight_model::model::Model;
 use loopsight_model::registry::BuildError;
-use loopsight_model::run::Run;
+use loopsight_model::run::{Rows, Run};
 
 use crate::robot::Robot;
 use crate::simulated::Simulated;
@@ -36,16 +36,9 @@ pub fn simulate_inputs(
             format!("row {} holds {}", bad / n_inputs, inputs[bad]),
         ));
     }
-    let mut run = Run {
-        name: String::new(),
-        time: time.to_vec(),
-        inputs: inputs.to_vec(),
-        measured: vec![0.0; time.len() * n_measured],
-        n_inputs,
-        n_measured,
-        observer: None,
-    };
-    for (k, row) in run.measured.chunks_exact_mut(n_measured).enumerate() {
+    let mut inputs = Rows::new(n_inputs, inputs.to_vec());
+    let mut measured = Rows::new(n_measured, vec![0.0; time.len() * n_measured]);
+    for (k, row) in measured.values.chunks_exact_mut(n_measured).enumerate() {
         if k > 0 {
             let (from, to) = (time[k - 1], time[k]);
             if !(to > from && (to - from).is_finite()) {
@@ -54,7 +47,7 @@ pub fn simulate_inputs(
                     format!("{from} s is followed by {to} s, expected times that increase"),
                 ));
             }
-            let before = &mut run.inputs[(k - 1) * n_inputs..k * n_inputs];
+            let before = &mut inputs.values[(k - 1) * n_inputs..k * n_inputs];
             robot.limit(before);
             robot.advance(to - time[0], before);
         }
@@ -69,9 +62,10 @@ pub fn simulate_inputs(
             row.fill(f64::NAN);
         }
     }
-    let last = run.inputs.len().saturating_sub(n_inputs);
-    robot.limit(&mut run.inputs[last..]);
-    Ok(run)
+    let last = inputs.values.len().saturating_sub(n_inputs);
+    robot.limit(&mut inputs.values[last..]);
+    Run::new("", time.to_vec(), inputs, measured)
+        .map_err(|error| BuildError::at("time", error.to_string()))
 }
 
 #[cfg(test)]
@@ -227,7 +221,7 @@ mod tests {
             ..Simulated::default()
         };
         let run = simulate_inputs(&model, &settings, &[5.0, 5.1], &[9.0, -9.0, 3.0, 7.0]).unwrap();
-        assert_eq!(run.inputs, [6.0, -6.0, 3.0, 6.0]);
+        assert_eq!(run.inputs(), [6.0, -6.0, 3.0, 6.0]);
         let key = |time: &[f64], inputs: &[f64]| {
             simulate_inputs(&model, &settings, time, inputs)
                 .unwrap_err()

@@ -70,12 +70,16 @@ impl DriverPart for Replay {
         let run = self.choose(runs)?;
         let model = context.model;
         let expected = (model.plant.inputs.len(), model.measured.len());
-        if (run.n_inputs, run.n_measured) != expected {
+        if (run.n_inputs(), run.n_measured()) != expected {
             return Err(BuildError::at(
                 "recording",
                 format!(
                     "`{}` has {} inputs and {} measured signals, the loop's model {} and {}",
-                    self.recording, run.n_inputs, run.n_measured, expected.0, expected.1
+                    self.recording,
+                    run.n_inputs(),
+                    run.n_measured(),
+                    expected.0,
+                    expected.1
                 ),
             ));
         }
@@ -92,7 +96,7 @@ impl DriverPart for Replay {
             .help("give the loop the period of the recording"));
         }
         Ok(Box::new(ReplayDriver {
-            held: vec![0.0; run.n_measured],
+            held: vec![0.0; run.n_measured()],
             run,
             period: context.period,
             next: 0,
@@ -115,8 +119,8 @@ impl Replay {
                     format!("`{}` holds no run to play", self.recording),
                 )
             })?,
-            Some(name) => runs.iter().position(|r| r.name == *name).ok_or_else(|| {
-                let names: Vec<&str> = runs.iter().map(|r| r.name.as_str()).collect();
+            Some(name) => runs.iter().position(|r| r.name() == *name).ok_or_else(|| {
+                let names: Vec<&str> = runs.iter().map(|r| r.name()).collect();
                 let error = BuildError::at(
                     "run",
                     match names[..] {
@@ -162,19 +166,19 @@ impl Driver<f64> for ReplayDriver {
                 message: format!("the recording is over after {} samples", self.run.len()),
             });
         }
-        if measured.len() != self.run.n_measured {
+        if measured.len() != self.run.n_measured() {
             return Err(HostDriverError {
                 fault: DriverFault::Rejected,
                 message: format!(
                     "{} measured signals, expected {}",
                     measured.len(),
-                    self.run.n_measured
+                    self.run.n_measured()
                 ),
             });
         }
         self.next += 1;
         let on_time = k == 0 || {
-            let span = self.run.time[k] - self.run.time[k - 1];
+            let span = self.run.time()[k] - self.run.time()[k - 1];
             (span - self.period).abs() <= LATE * self.period
         };
         let mut complete = true;
@@ -191,7 +195,7 @@ impl Driver<f64> for ReplayDriver {
             *to = *held;
         }
         Ok(Sample {
-            time: self.run.time[k] - self.run.time[0],
+            time: self.run.time()[k] - self.run.time()[0],
             fresh: on_time && complete,
         })
     }
@@ -213,19 +217,40 @@ impl Driver<f64> for ReplayDriver {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use loopsight_model::run::Rows;
+
     use crate::fixture::{build, instants, twil_encoders, voltages};
     use crate::{Simulated, simulate_inputs};
 
     fn recorded(name: &str) -> Run {
-        let mut run = simulate_inputs(
+        let run = simulate_inputs(
             &twil_encoders(),
             &Simulated::default(),
             &instants(100),
             &voltages(100),
         )
         .unwrap();
-        run.name = name.to_owned();
-        run
+        run.named(name)
+    }
+
+    /// The run with other instants.
+    fn at(run: &Run, time: impl Fn(usize, f64) -> f64) -> Run {
+        let time = run.time().iter().enumerate().map(|(k, t)| time(k, *t));
+        let rows = |width, values: &[f64]| Rows::new(width, values.to_vec());
+        Run::new(
+            run.name(),
+            time.collect(),
+            rows(run.n_inputs(), run.inputs()),
+            rows(run.n_measured(), run.measured()),
+        )
+        .unwrap()
+    }
+
+    /// The run with one measured value changed.
+    fn measuring(run: Run, index: usize, value: f64) -> Run {
+        let mut measured = run.measured().to_vec();
+        measured[index] = value;
+        run.with_measured(measured).unwrap()
     }
 
     fn part(run: Option<&str>) -> Replay {
@@ -248,7 +273,7 @@ mod tests {
         let (mut y, mut applied) = ([0.0; 2], [0.0; 2]);
         for k in 0..run.len() {
             let sample = driver.read(&mut y).unwrap();
-            assert_eq!((sample.time, sample.fresh), (run.time[k], true));
+            assert_eq!((sample.time, sample.fresh), (run.time()[k], true));
             assert_eq!(y, run.sample(k));
             driver.write(&[f64::NAN, 99.0], &mut applied).unwrap();
             assert_eq!(applied, run.input(k));
@@ -262,8 +287,7 @@ mod tests {
 
     #[test]
     fn runs_are_chosen_by_name() {
-        let mut runs = [recorded("slow"), recorded("fast")];
-        runs[1].measured[2] = 42.0;
+        let runs = [recorded("slow"), measuring(recorded("fast"), 2, 42.0)];
         let model = twil_encoders();
         let second = |name| {
             let mut driver = build(&part(name), &model, None, &runs).unwrap();
@@ -283,11 +307,8 @@ mod tests {
 
     #[test]
     fn missing_values_and_gaps_are_not_fresh() {
-        let mut run = recorded("");
-        run.measured[2 * 5] = f64::NAN;
-        for time in &mut run.time[20..] {
-            *time += 0.5;
-        }
+        let run = measuring(recorded(""), 2 * 5, f64::NAN);
+        let run = at(&run, |k, t| if k < 20 { t } else { t + 0.5 });
         let mut driver = build(
             &part(None),
             &twil_encoders(),
@@ -309,15 +330,17 @@ mod tests {
     fn a_recording_that_does_not_fit_is_refused() {
         let model = twil_encoders();
         let refused = |run: Run| build(&part(None), &model, None, &[run]).err().unwrap();
-        let mut slow = recorded("");
-        for time in &mut slow.time {
-            *time *= 2.0;
-        }
-        let error = refused(slow);
+        let error = refused(at(&recorded(""), |_, t| 2.0 * t));
         assert!(error.message.contains("0.02"), "{error}");
-        let mut narrow = recorded("");
-        narrow.n_inputs = 1;
-        assert_eq!(refused(narrow).key, "recording");
+        let wide = recorded("");
+        let inputs = Rows::new(1, wide.inputs()[..wide.len()].to_vec());
+        let narrow = Run::new(
+            "",
+            wide.time().to_vec(),
+            inputs,
+            Rows::new(2, wide.measured().to_vec()),
+        );
+        assert_eq!(refused(narrow.unwrap()).key, "recording");
         assert_eq!(refused(Run::default()).key, "recording");
     }
 }

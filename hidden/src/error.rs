@@ -37,6 +37,9 @@ pub enum HiddenError {
         /// The largest that is possible.
         largest: f64,
     },
+    /// What was recorded is no run.
+    #[error(transparent)]
+    Run(#[from] loopsight_model::run::RunError),
     /// An excitation could not be built.
     #[error("excitation: {0}")]
     Excitation(#[from] BuildError),

@@ -125,22 +125,11 @@ fn along_driven(
     } = Live::with_winding(driven, effects, seed, winding_time_constant)?;
     let drives = driven.drives();
 
-    let mut run = Run {
-        time: (0..samples).map(|k| k as f64 / 100.0).collect(),
-        inputs: commands
-            .iter()
-            .flat_map(|c| &c[..drives])
-            .copied()
-            .collect(),
-        measured: Vec::with_capacity(samples * signals),
-        n_inputs: drives,
-        n_measured: signals,
-        ..Run::default()
-    };
+    let mut run = Run::empty(drives, signals);
     let mut exact = Vec::with_capacity(samples * signals);
-    for command in commands {
+    for (k, command) in commands.iter().enumerate() {
         let (counted, smooth) = odometry.sample(PERIOD);
-        run.measured.extend(&counted[..signals]);
+        run.push(k as f64 / 100.0, &command[..drives], &counted[..signals])?;
         exact.extend(&smooth[..signals]);
         for step in 1..=STEPS {
             machine.step(*command);
@@ -158,10 +147,7 @@ fn along_driven(
         }
     }
     Ok(Recording {
-        exact: Run {
-            measured: exact,
-            ..run.clone()
-        },
+        exact: run.clone().with_measured(exact)?,
         run,
         truth: Truth {
             robot,
@@ -178,7 +164,7 @@ fn along_driven(
 /// signal by signal; the overall value of the diagnosis is the root mean square of these.
 pub fn nrmse(measured: &Run, other: &Run) -> Vec<f64> {
     let n = measured.len() as f64;
-    (0..measured.n_measured)
+    (0..measured.n_measured())
         .map(|j| {
             let values = || (0..measured.len()).map(|k| measured.sample(k)[j]);
             let mean = values().sum::<f64>() / n;
@@ -214,7 +200,7 @@ impl Recording {
         let run = &self.run;
         let rows: Vec<f64> = (0..run.len())
             .flat_map(|k| {
-                std::iter::once(run.time[k])
+                std::iter::once(run.time()[k])
                     .chain(run.input(k).iter().copied())
                     .chain(run.sample(k).iter().copied())
             })

@@ -33,7 +33,7 @@ pub fn refit(log: &Recording) -> Refit {
     if let Kind::Rig(sheet) = log.truth.robot.kind() {
         return Refit::Parts(machines::refit(sheet, log));
     }
-    let parameters = (0..log.run.n_measured)
+    let parameters = (0..log.run.n_measured())
         .map(|signal| {
             let gain_and_error = |damping: f64| {
                 let unit = response(log, signal, damping);
@@ -101,8 +101,8 @@ fn response(log: &Recording, signal: usize, damping: f64) -> Vec<f64> {
                 (Robot::Twil, _) => u[0] - u[1],
                 _ => u[0],
             };
-            let h = match run.time.get(k + 1) {
-                Some(next) => next - run.time[k],
+            let h = match run.time().get(k + 1) {
+                Some(next) => next - run.time()[k],
                 None => return out,
             };
             let settled = s / damping;

@@ -27,11 +27,7 @@ fn run(model: &Model) -> Run {
     let n_inputs = model.plant.inputs.len();
     let mut state = 12_345u32;
     let mut level = vec![0.0; n_inputs];
-    let mut run = Run {
-        n_inputs,
-        n_measured: model.measured.len(),
-        ..Run::default()
-    };
+    let mut run = Run::empty(n_inputs, model.measured.len());
     for k in 0..1000 {
         if k % 25 == 0 {
             for u in &mut level {
@@ -39,9 +35,8 @@ fn run(model: &Model) -> Run {
                 *u = f64::from((state >> 24) % 9) * 2.31 - 9.24;
             }
         }
-        run.time.push(0.01 * f64::from(k));
-        run.inputs.extend(&level);
-        run.measured.extend(vec![f64::NAN; run.n_measured]);
+        let missing = vec![f64::NAN; run.n_measured()];
+        run.push(0.01 * f64::from(k), &level, &missing).unwrap();
     }
     run
 }

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use loopsight_model::model::Model;
-use loopsight_model::run::Run;
+use loopsight_model::run::{Rows, Run};
 use loopsight_model::simulate::{Simulator, free_run};
 use loopsight_plants as _;
 
@@ -24,14 +24,9 @@ const FIRST_ORDER: &str =
 /// The speed from rest, driven by `2 t` volts.
 fn ramp(model: &Model) -> Vec<f64> {
     let time: Vec<f64> = (0..=20).map(|k| PERIOD * f64::from(k)).collect();
-    let run = Run {
-        inputs: time.iter().map(|t| 2.0 * t).collect(),
-        measured: vec![f64::NAN; time.len()],
-        n_inputs: 1,
-        n_measured: 1,
-        time,
-        ..Run::default()
-    };
+    let inputs = Rows::new(1, time.iter().map(|t| 2.0 * t).collect());
+    let measured = Rows::new(1, vec![f64::NAN; time.len()]);
+    let run = Run::new("ramp", time, inputs, measured).unwrap();
     let mut simulator = Simulator::new(model, &model.values());
     let mut speeds = Vec::new();
     free_run(&mut simulator, &[0.0, 0.0], &run, |_, y| speeds.push(y[0]));

@@ -1,5 +1,6 @@
 //! What can be wrong with a file, said with place, expectation and finding.
 
+use loopsight_model::run::RunError;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -49,6 +50,14 @@ pub enum RecordingError {
     Directory {
         /// The folder.
         path: PathBuf,
+    },
+    /// What a run says makes no sense together.
+    #[error("{log}: {error}")]
+    Run {
+        /// The file.
+        log: Box<str>,
+        /// What is wrong with the run.
+        error: RunError,
     },
     /// No content at all.
     #[error("{log}: the file is empty")]

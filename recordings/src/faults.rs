@@ -44,7 +44,7 @@ fn irregular_time(recording: &Recording) -> Option<Fault> {
     let mut steps: Vec<f64> = recording
         .runs
         .iter()
-        .flat_map(|run| run.time.windows(2).map(|w| w[1] - w[0]))
+        .flat_map(|run| run.time().windows(2).map(|w| w[1] - w[0]))
         .collect();
     steps.sort_by(f64::total_cmp);
     let [min, low, median, high, max] = [0.0, 0.01, 0.5, 0.99, 1.0].map(|q| quantile(&steps, q));

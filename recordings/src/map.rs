@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use loopsight_core::Signal;
 use loopsight_model::log_map::LogMap;
-use loopsight_model::run::Run;
+use loopsight_model::run::{Rows, Run};
 use loopsight_model::sensor::Sensor;
 
 use crate::error::RecordingError;
@@ -215,17 +215,17 @@ impl<'a> Mapper<'a> {
             let part_name = self.part_name(name);
             let time_of = |at: &usize| times[at - first_row].1;
             let start = part.first().map_or(0.0, time_of);
-            let mut out = Run {
-                name: part_name,
-                time: part.iter().map(|at| time_of(at) - start).collect(),
-                n_inputs: self.plan.inputs.len(),
-                n_measured: self.plan.measured.len(),
-                ..Run::default()
-            };
+            let times = part.iter().map(|at| time_of(at) - start).collect();
+            let mut inputs = Rows::new(self.plan.inputs.len(), Vec::new());
+            let mut measured = Rows::new(self.plan.measured.len(), Vec::new());
             for at in part {
-                self.row(run, *at, rows[*at], &mut out)?;
+                self.row(run, *at, rows[*at], &mut inputs, &mut measured)?;
             }
-            self.runs.push(out);
+            let built = Run::new(part_name, times, inputs, measured);
+            self.runs.push(built.map_err(|error| RecordingError::Run {
+                log: self.table.source.as_str().into(),
+                error,
+            })?);
         }
         Ok(())
     }
@@ -266,18 +266,19 @@ impl<'a> Mapper<'a> {
         run: &TableRun,
         at: usize,
         row: &[f64],
-        out: &mut Run,
+        inputs: &mut Rows,
+        measured: &mut Rows,
     ) -> Result<(), RecordingError> {
         let plan = self.plan;
         for (link, _) in &plan.inputs {
             let Some(link) = link else {
-                out.inputs.push(0.0);
+                inputs.values.push(0.0);
                 continue;
             };
             let value = row[link.column];
             self.check(run, at, *link, value, "an input")?;
             self.limit(run, at, *link, value * link.factor)?;
-            out.inputs.push(value * link.factor);
+            inputs.values.push(value * link.factor);
         }
         for (signal, (link, _)) in plan.measured.iter().enumerate() {
             let mut value = row[link.column] * link.factor;
@@ -288,7 +289,7 @@ impl<'a> Mapper<'a> {
                 self.absurd[signal].add(|| format!("{}: {value}", place()));
                 value = f64::NAN;
             }
-            out.measured.push(value);
+            measured.values.push(value);
         }
         Ok(())
     }
@@ -430,7 +431,7 @@ fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
         .iter()
         .enumerate()
         .filter(|(_, run)| is_short(run))
-        .map(|(i, run)| match run.name.as_str() {
+        .map(|(i, run)| match run.name() {
             "" if runs.len() == 1 => format!("{:.2} s", run.duration()),
             "" => format!("run {} {:.2} s", i + 1, run.duration()),
             name => format!("`{name}` {:.2} s", run.duration()),
@@ -439,13 +440,13 @@ fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
     if list.is_empty() {
         return (runs, None);
     }
-    let moves = |run: &Run| (0..run.n_measured).any(|s| faults::moves(run, s));
+    let moves = |run: &Run| (0..run.n_measured()).any(|s| faults::moves(run, s));
     let enough = runs.iter().any(|run| !is_short(run) && moves(run));
     let keep = !enough && runs.iter().any(|run| is_short(run) && moves(run));
     let names: Vec<&str> = runs
         .iter()
         .filter(|run| is_short(run))
-        .map(|run| run.name.as_str())
+        .map(|run| run.name())
         .collect();
     let (what, all_short) = (list.join(", "), names.len() == runs.len());
     let shorter = format!("shorter than {SHORT_RUN} s: {what}");

@@ -34,7 +34,7 @@ fn mapped(source: &Source, inputs: &[Signal], signals: &[Signal], log: &LogMap) 
     for run in &recording.runs {
         println!(
             "  {:15} {:6} samples {:8.3} s",
-            run.name,
+            run.name(),
             run.len(),
             run.duration()
         );
@@ -91,7 +91,7 @@ fn team4277_has_a_gyro_rate_off_by_57() {
     assert!(
         log.runs
             .iter()
-            .all(|run| run.time[0] == 0.0 && run.n_measured == 2)
+            .all(|run| run.time()[0] == 0.0 && run.n_measured() == 2)
     );
 }
 
@@ -124,7 +124,7 @@ fn team564_straight_has_voltages_with_signs() {
     let backward = log
         .runs
         .iter()
-        .find(|run| run.name == "slow-backward")
+        .find(|run| run.name() == "slow-backward")
         .unwrap();
     let (_, last) = (backward.input(0), backward.input(backward.len() - 1));
     assert!(last[0] < -4.0 && last[1] < -4.0, "{last:?}");
@@ -140,7 +140,7 @@ fn team564_turning_has_its_left_side_reversed() {
     let forward = log
         .runs
         .iter()
-        .find(|run| run.name == "fast-forward")
+        .find(|run| run.name() == "fast-forward")
         .unwrap();
     let middle = forward.input(forward.len() / 2);
     assert!(middle[0] > 5.0 && middle[1] < -5.0, "{middle:?}");

@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let round = |v: &f64| (v * 1e7).round() / 1e7;
     let rows: Vec<f64> = (0..run.len())
         .flat_map(|k| {
-            let time = run.time[k] - run.time[0];
+            let time = run.time()[k] - run.time()[0];
             let row = std::iter::once(&time)
                 .chain(run.input(k))
                 .chain(run.sample(k));

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use loopsight_model::model::Model;
+use loopsight_model::model::{MeasuredSignal, Model};
 use loopsight_model::run::Run;
 use loopsight_model::simulate::Simulator;
 
@@ -108,21 +108,14 @@ fn closed<const N: usize, const M: usize>(
     fine.max_step = STEP;
     let mut simulator = Simulator::new(&fine, &fine.values());
     simulator.reset(&start, &[0.0]);
-    let mut run = Run {
-        n_inputs: 1,
-        n_measured: truth.measured.len(),
-        ..Run::default()
-    };
+    let mut run = Run::empty(1, truth.measured.len());
     for k in 0..=(seconds / PERIOD).round() as usize {
         let time = PERIOD * k as f64;
         let (input, measured) = tick(k, simulator.state());
-        run.time.push(time);
-        run.inputs.push(input);
-        for m in &truth.measured {
-            // States are numbered as they are measured here.
-            let index = if M == N { m.index } else { 0 };
-            run.measured.push(measured[index]);
-        }
+        // States are numbered as they are measured here.
+        let index = |m: &MeasuredSignal| if M == N { m.index } else { 0 };
+        let row: Vec<f64> = truth.measured.iter().map(|m| measured[index(m)]).collect();
+        run.push(time, &[input], &row).unwrap();
         simulator.advance(time + PERIOD, &[input]);
     }
     run

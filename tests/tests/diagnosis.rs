@@ -120,9 +120,7 @@ fn a_log_that_cannot_show_it_is_called_insufficient() {
 #[test]
 fn constant_inputs_and_short_logs_are_refused_with_the_reason() {
     let mut recording = log(&[], Experiment::Prbs, 6);
-    let short = Run {
-        ..recording.run.part(0..150)
-    };
+    let short = recording.run.part(0..150);
     let refused = diagnose(
         &model(&recording),
         &Measurements::new(&[short]),
@@ -135,9 +133,9 @@ fn constant_inputs_and_short_logs_are_refused_with_the_reason() {
         "{:?}",
         refused.advice
     );
-    for row in recording.run.inputs.chunks_exact_mut(2) {
-        row[0] = 5.0;
-    }
+    let mut inputs = recording.run.inputs().to_vec();
+    inputs.chunks_exact_mut(2).for_each(|row| row[0] = 5.0);
+    recording.run = recording.run.with_inputs(inputs).unwrap();
     let refused = judge(&recording, None);
     assert_eq!(refused.verdict, Conclusion::DataInsufficient);
     assert!(

@@ -8,7 +8,7 @@
 
 use loopsight_diagnosis::{Fit, FitSettings, Measurements, Method, Scheme, Work, fit::fit};
 use loopsight_model::model::Model;
-use loopsight_model::run::Run;
+use loopsight_model::run::{Rows, Run};
 use loopsight_model::sensor::Sensor;
 use loopsight_tests::{PERIOD, instants, measured_by, prbs, recording, twil, unknown};
 use rayon::prelude::*;
@@ -78,15 +78,7 @@ fn without_noise_the_papers_recursion_returns_the_six_parameters() {
         v += PERIOD * rate[0];
         omega += PERIOD * rate[1];
     }
-    let run = Run {
-        name: String::new(),
-        time,
-        inputs,
-        measured,
-        n_inputs: 2,
-        n_measured: 2,
-        observer: None,
-    };
+    let run = Run::new("", time, Rows::new(2, inputs), Rows::new(2, measured)).unwrap();
     let fit = fitted(&truth, run, Method::Rls, Scheme::Euler);
     for name in NAMES {
         let off = error(&fit, &truth, name);

@@ -11,7 +11,7 @@ use loopsight_model::config::Source;
 use loopsight_model::loop_file::LoopFile;
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, DriverContext, parts, plants};
-use loopsight_model::run::Run;
+use loopsight_model::run::{Rows, Run};
 use loopsight_recordings::{map, read, read_csv_from, read_sysid};
 use loopsight_tests::{Random, repository, twil, twil_path};
 
@@ -123,15 +123,9 @@ fn use_model(text: &str) -> bool {
 fn short_run(model: &Model) -> Run {
     let (n, n_inputs, n_measured) = (20, model.plant.inputs.len(), model.measured.len());
     let row = |k: usize, width: usize| (0..width).map(move |i| ((k * 3 + i) % 5) as f64 * 0.1);
-    Run {
-        name: String::new(),
-        time: (0..n).map(|k| k as f64 * 0.01).collect(),
-        inputs: (0..n).flat_map(|k| row(k, n_inputs)).collect(),
-        measured: (0..n).flat_map(|k| row(k, n_measured)).collect(),
-        n_inputs,
-        n_measured,
-        observer: None,
-    }
+    let rows = |width| Rows::new(width, (0..n).flat_map(|k| row(k, width)).collect());
+    let time = (0..n).map(|k| k as f64 * 0.01).collect();
+    Run::new("", time, rows(n_inputs), rows(n_measured)).unwrap()
 }
 
 #[test]

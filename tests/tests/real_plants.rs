@@ -14,7 +14,7 @@ use loopsight_diagnosis::{
     Comparison, Conclusion, Fit, FitSettings, Measurements, Work, compare, diagnose, fit,
 };
 use loopsight_model::model::Model;
-use loopsight_model::run::Run;
+use loopsight_model::run::{Rows, Run};
 use loopsight_tests::{real_data, repository};
 
 /// The model file `name`, with what `edit` makes of its text.
@@ -37,10 +37,12 @@ fn recording(model: &mut Model, file: &str, rows: Range<usize>) -> Option<Vec<Ru
         .collect();
     model.measure(&measured).unwrap();
     let run = &mapped.runs[0];
-    let mut part = run.part(rows.start..rows.end.min(run.len()));
-    let start = part.time[0];
-    part.time.iter_mut().for_each(|t| *t -= start);
-    Some(vec![part])
+    let part = run.part(rows.start..rows.end.min(run.len()));
+    let start = part.time()[0];
+    let inputs = Rows::new(part.n_inputs(), part.inputs().to_vec());
+    let measured = Rows::new(part.n_measured(), part.measured().to_vec());
+    let time = part.time().iter().map(|t| t - start).collect();
+    Some(vec![Run::new(part.name(), time, inputs, measured).unwrap()])
 }
 
 const ALL: Range<usize> = 0..usize::MAX;

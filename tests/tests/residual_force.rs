@@ -42,11 +42,7 @@ fn record(robot: Robot, force: Force, excitation: impl Fn(u64) -> Excitation, se
     let h = PERIOD / STEPS as f64;
     let (mut speed, mut angle) = ([0.0; 2], [0.0; 2]);
     let mut before = [0.0; 2];
-    let mut run = Run {
-        n_inputs: wheels,
-        n_measured: wheels,
-        ..Run::default()
-    };
+    let mut run = Run::empty(wheels, wheels);
     for k_sample in 0..2501 {
         let time = PERIOD * k_sample as f64;
         let mut volts = [0.0; 2];
@@ -56,15 +52,15 @@ fn record(robot: Robot, force: Force, excitation: impl Fn(u64) -> Excitation, se
         let counts = angle.map(|a: f64| (a / RESOLUTION).floor() * RESOLUTION);
         let difference = [0, 1].map(|i| (counts[i] - before[i]) / PERIOD);
         before = counts;
-        run.time.push(time);
-        run.inputs.extend(&volts[..wheels]);
-        match robot {
-            Robot::Twil => run.measured.extend([
+        let measured = match robot {
+            Robot::Twil => [
                 r / 2.0 * (difference[0] + difference[1]),
                 r / (2.0 * b) * (difference[0] - difference[1]),
-            ]),
-            Robot::Axis => run.measured.push(difference[0]),
-        }
+            ],
+            Robot::Axis => [difference[0], 0.0],
+        };
+        run.push(time, &volts[..wheels], &measured[..wheels])
+            .unwrap();
         for _ in 0..STEPS {
             let with = [0, 1].map(|i| volts[i] + force(speed[i], angle[i], volts[i], time));
             match robot {

@@ -54,25 +54,29 @@ fn friction_is_told_by_direction() {
 fn a_bad_run_is_named_or_numbered() {
     let (model, run) = stiff_axis();
     let mut runs = vec![run.part(0..800), run.part(800..1600), run.part(1600..2400)];
-    for y in &mut runs[1].measured[300..500] {
-        *y += 30.0;
-    }
+    let mut off = runs[1].measured().to_vec();
+    off[300..500].iter_mut().for_each(|y| *y += 30.0);
+    runs[1] = runs[1].clone().with_measured(off).unwrap();
     let said = |runs: &[Run]| {
         compare(&model, &Measurements::new(runs), &Work::quiet())
             .unwrap()
             .where_it_fails
     };
     assert!(of(&said(&runs), "of speed is in run 2, which is 33 %").is_some());
-    for (run, name) in runs.iter_mut().zip(["slow", "fast", "back"]) {
-        run.name = name.to_owned();
-    }
+    let names = ["slow", "fast", "back"];
+    let runs: Vec<_> = runs
+        .into_iter()
+        .zip(names)
+        .map(|(run, name)| run.named(name))
+        .collect();
     assert!(of(&said(&runs), "is in run fast, which").is_some());
 }
 
 #[test]
 fn what_was_not_measured_is_no_reason_to_fail() {
-    let (model, mut run) = stiff_axis();
-    run.measured.fill(f64::NAN);
+    let (model, run) = stiff_axis();
+    let nothing = vec![f64::NAN; run.measured().len()];
+    let run = run.with_measured(nothing).unwrap();
     assert_eq!(
         compare(&model, &Measurements::new(&[run]), &Work::quiet())
             .unwrap()

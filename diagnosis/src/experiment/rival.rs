@@ -1,7 +1,7 @@
 //! How far a rival stays from the truth after it did its best.
 
 use loopsight_model::model::{Model, pseudo_inverse};
-use loopsight_model::run::Run;
+use loopsight_model::run::{Rows, Run};
 use loopsight_model::sensor::Sensor;
 use nalgebra::{DMatrix, DVector};
 
@@ -40,15 +40,13 @@ pub(crate) fn response(
     drive: &Drive,
     work: &Work<'_>,
 ) -> Result<Run, Cancelled> {
-    let mut run = Run {
-        time: drive.time.clone(),
-        inputs: drive.inputs.clone(),
-        n_inputs: model.plant.inputs.len(),
-        n_measured: model.measured.len(),
-        ..Run::default()
-    };
-    run.measured = predict(model, values, &vec![0.0; model.n_states()], &run, work)?;
-    Ok(run)
+    // The instants of a drive increase, and it has one row of inputs for each: there is such a run.
+    let inputs = Rows::new(model.plant.inputs.len(), drive.inputs.clone());
+    let width = model.measured.len();
+    let measured = Rows::new(width, vec![f64::NAN; width * drive.time.len()]);
+    let run = Run::new("", drive.time.clone(), inputs, measured).unwrap_or_default();
+    let predicted = predict(model, values, &vec![0.0; model.n_states()], &run, work)?;
+    Ok(run.with_measured(predicted).unwrap_or_default())
 }
 
 /// Fits the free parameters of `model` to `truth` from `start` by Gauss–Newton (steps halved until

@@ -33,8 +33,8 @@ fn blocks(runs: &[Run]) -> (Vec<usize>, usize) {
     let mut first = 0;
     for run in runs {
         let mut last = first;
-        for time in &run.time {
-            last = first + ((time - run.time[0]) / length) as usize;
+        for time in run.time() {
+            last = first + ((time - run.time()[0]) / length) as usize;
             all.push(last);
         }
         first = last + 1;

@@ -254,7 +254,7 @@ fn filtered(
     let mut beyond = DVector::zeros(ny);
     for k in 1..run.len() {
         work.go_on()?;
-        let until = run.time[k] - run.time[0];
+        let until = run.time()[k] - run.time()[0];
         let before: Vec<f64> = simulator.signals().to_vec();
         let ab = linear.step(simulator.state(), until, run.input(k - 1));
         simulator.advance(until, run.input(k - 1));
@@ -267,7 +267,7 @@ fn filtered(
             .zip(&before)
             .map(|(a, b)| 0.5 * (a + b))
             .collect();
-        middle[nx..nx + run.n_inputs].copy_from_slice(run.input(k - 1));
+        middle[nx..nx + run.n_inputs()].copy_from_slice(run.input(k - 1));
         innovation(run.sample(k), &outputs, &rounded, beyond.as_mut_slice());
 
         let mut a = DMatrix::zeros(nz + ny, nz);

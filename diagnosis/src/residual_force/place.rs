@@ -109,7 +109,7 @@ impl Group {
         }
         let times: Vec<f64> = runs
             .iter()
-            .flat_map(|r| r.time.iter().map(move |t| t - r.time[0]))
+            .flat_map(|r| r.time().iter().map(move |t| t - r.time()[0]))
             .collect();
         let squares: f64 = times.iter().map(|t| t * t).sum();
         quantities.push(Quantity {

@@ -35,25 +35,20 @@ pub(crate) fn along_rig(
                 })
         })
         .collect::<Result<Vec<Concealed>, HiddenError>>()?;
-    let mut run = Run {
-        time: (0..commands.len()).map(|k| k as f64 / sheet.rate).collect(),
-        n_inputs: sheet.inputs,
-        n_measured: sheet.signals(),
-        ..Run::default()
-    };
-    let mut exact = Vec::with_capacity(commands.len() * run.n_measured);
-    for [command, _] in commands {
+    let mut run = Run::empty(sheet.inputs, sheet.signals());
+    let mut exact = Vec::with_capacity(commands.len() * sheet.signals());
+    for (k, [command, _]) in commands.iter().enumerate() {
         let row = rig.sample(*command);
-        run.inputs.extend(&row.inputs[..sheet.inputs]);
-        run.measured.extend(&row.measured[..run.n_measured]);
-        exact.extend(&row.exact[..run.n_measured]);
+        run.push(
+            k as f64 / sheet.rate,
+            &row.inputs[..sheet.inputs],
+            &row.measured[..sheet.signals()],
+        )?;
+        exact.extend(&row.exact[..sheet.signals()]);
         rig.advance();
     }
     Ok(Recording {
-        exact: Run {
-            measured: exact,
-            ..run.clone()
-        },
+        exact: run.clone().with_measured(exact)?,
         run,
         truth: Truth {
             robot,

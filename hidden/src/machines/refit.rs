@@ -90,7 +90,7 @@ fn residual(sheet: &'static Sheet, parts: &[f64], log: &Recording) -> Vec<f64> {
         .collect();
     let run = &log.run;
     let n = run.len() as f64;
-    (0..run.n_measured)
+    (0..run.n_measured())
         .flat_map(|j| {
             let measured = || (0..run.len()).map(move |k| run.sample(k)[j]);
             let mean = measured().sum::<f64>() / n;

@@ -207,11 +207,11 @@ fn nothing_runs_away() {
     ] {
         for experiment in Experiment::ALL {
             let log = record(robot, &[], experiment, 3).unwrap();
-            let n = log.exact.n_measured;
+            let n = log.exact.n_measured();
             for (j, name) in robot.columns().iter().rev().take(n).rev().enumerate() {
                 let values: Vec<f64> = log
                     .exact
-                    .measured
+                    .measured()
                     .iter()
                     .skip(j)
                     .step_by(n)

@@ -82,16 +82,16 @@ pub(crate) fn recording(model: &mut Model, path: &Path) -> Result<(Vec<Run>, Vec
 /// Joins further recordings of the same machine to the log.
 pub(crate) fn join(loaded: &mut Loaded, paths: &[PathBuf]) -> Result<(), Failure> {
     for path in paths {
-        let mut runs = further(loaded, path)?;
+        let runs = further(loaded, path)?;
         let file = path.file_stem().unwrap_or_default().to_string_lossy();
-        for run in &mut runs {
-            run.name = if run.name.is_empty() {
+        loaded.runs.extend(runs.into_iter().map(|run| {
+            let name = if run.name().is_empty() {
                 file.to_string()
             } else {
-                format!("{file} {}", run.name)
+                format!("{file} {}", run.name())
             };
-        }
-        loaded.runs.extend(runs);
+            run.named(name)
+        }));
     }
     Ok(())
 }

@@ -98,10 +98,7 @@ fn measuring(text: &str, signals: &[&str]) -> Model {
 fn run(n_inputs: usize) -> Run {
     let mut state = 2_018u32;
     let mut level = vec![0.0; n_inputs];
-    let mut run = Run {
-        n_inputs,
-        ..Run::default()
-    };
+    let mut run = Run::empty(n_inputs, 0);
     for k in 0..1000 {
         if k % 25 == 0 {
             for u in &mut level {
@@ -109,8 +106,7 @@ fn run(n_inputs: usize) -> Run {
                 *u = f64::from((state >> 24) % 9) * 2.31 - 9.24;
             }
         }
-        run.time.push(0.01 * f64::from(k));
-        run.inputs.extend(&level);
+        run.push(0.01 * f64::from(k), &level, &[]).unwrap();
     }
     run
 }

@@ -25,7 +25,7 @@ pub(crate) fn check(recording: &Recording, inputs: &[&str]) -> Vec<Fault> {
     let still: Vec<&str> = runs
         .iter()
         .filter(|run| !any_moves(run))
-        .map(|run| run.name.as_str())
+        .map(|run| run.name())
         .collect();
     if still.len() == runs.len() {
         let detail = if runs.iter().any(driven) {
@@ -88,7 +88,7 @@ pub(crate) fn check(recording: &Recording, inputs: &[&str]) -> Vec<Fault> {
             let names: Vec<&str> = constant
                 .iter()
                 .filter(|run| drive.acts(run))
-                .map(|run| run.name.as_str())
+                .map(|run| run.name())
                 .collect();
             let detail = format!(
                 "does not change there ({value}), although {said} acts and other signals move"

@@ -42,7 +42,7 @@ pub(crate) fn check(recording: &Recording, inputs: &[&str]) -> Vec<Fault> {
                 let moved = range(&mut (from..to).map(|k| run.sample(k)[*o]));
                 *size > 0.0 && moved > OTHER_CHANGE * size
             });
-            let lasts = run.time[to - 1] - run.time[from];
+            let lasts = run.time()[to - 1] - run.time()[from];
             if lasts >= LONG && full > 0.0 && driven > DRIVE_CHANGE * full && others_move {
                 if names.is_empty() {
                     first = format!(
@@ -50,11 +50,11 @@ pub(crate) fn check(recording: &Recording, inputs: &[&str]) -> Vec<Fault> {
                          {driven:.2} and other signals move",
                         run.sample(from)[s],
                         measured.unit,
-                        run.time[from],
+                        run.time()[from],
                         drive.describe(inputs)
                     );
                 }
-                names.push(run.name.as_str());
+                names.push(run.name());
             }
         }
         if !names.is_empty() {
@@ -76,7 +76,7 @@ fn longest(run: &Run, s: usize) -> Option<(usize, usize)> {
     for k in 1..=run.len() {
         if k == run.len() || run.sample(k)[s] != run.sample(from)[s] {
             if best.is_none_or(|(a, b)| {
-                run.time[k - 1] - run.time[from] > run.time[b - 1] - run.time[a]
+                run.time()[k - 1] - run.time()[from] > run.time()[b - 1] - run.time()[a]
             }) {
                 best = Some((from, k));
             }

@@ -53,8 +53,8 @@ fn columns_are_found_by_name_and_converted() {
         "junk,time_ms,voltage_mV,speed_rpm,angle_deg\n9,500,1500,60,180\n9,2500,-1500,30,0\n";
     let recording = mapped(text, &LogMap::default()).unwrap();
     let run = &recording.runs[0];
-    assert_eq!(run.time, [0.0, 2.0]);
-    assert_eq!(run.inputs, [1.5, -1.5]);
+    assert_eq!(run.time(), [0.0, 2.0]);
+    assert_eq!(run.inputs(), [1.5, -1.5]);
     assert!((run.sample(0)[0] - std::f64::consts::TAU).abs() < 1e-12);
     assert!((run.sample(0)[1] - std::f64::consts::PI).abs() < 1e-12);
     assert_eq!(recording.measured[1].id, "angle");
@@ -79,14 +79,10 @@ fn the_model_file_names_columns_units_and_scales() {
     };
     let recording = mapped(text, &log_map).unwrap();
     assert_eq!(
-        recording
-            .runs
-            .iter()
-            .map(|r| r.name.as_str())
-            .collect::<Vec<_>>(),
+        recording.runs.iter().map(|r| r.name()).collect::<Vec<_>>(),
         ["1", "2"]
     );
-    assert_eq!(recording.runs[0].inputs, [-4.0, -5.0]);
+    assert_eq!(recording.runs[0].inputs(), [-4.0, -5.0]);
     assert_eq!(recording.measured.len(), 1);
 }
 
@@ -99,8 +95,8 @@ fn runs_may_have_names() {
         ..LogMap::default()
     };
     let recording = mapped(text, &log_map).unwrap();
-    assert_eq!(recording.runs[1].name, "down");
-    assert_eq!(recording.runs[1].time, [0.0, 2.0]);
+    assert_eq!(recording.runs[1].name(), "down");
+    assert_eq!(recording.runs[1].time(), [0.0, 2.0]);
 }
 
 #[test]
@@ -211,7 +207,7 @@ fn a_clean_log_has_no_faults() {
     let recording = mapped(&log(|_, row| Some(row)), &LogMap::default()).unwrap();
     assert_eq!(kinds(&recording), []);
     assert_eq!(recording.runs.len(), 1);
-    assert_eq!(recording.runs[0].name, "");
+    assert_eq!(recording.runs[0].name(), "");
 }
 
 #[test]
@@ -253,14 +249,10 @@ fn gaps_and_restarts_split_runs() {
             .starts_with("1 gaps, the longest 2.100 s")
     );
     assert_eq!(
-        recording
-            .runs
-            .iter()
-            .map(|r| r.name.as_str())
-            .collect::<Vec<_>>(),
+        recording.runs.iter().map(|r| r.name()).collect::<Vec<_>>(),
         ["", "#2"]
     );
-    assert_eq!(recording.runs[1].time[0], 0.0);
+    assert_eq!(recording.runs[1].time()[0], 0.0);
     let restart = log(|k, [t, u, w]| Some([if k < 15 { t } else { t - 1.5 }, u, w]));
     let recording = mapped(&restart, &LogMap::default()).unwrap();
     assert_eq!(kinds(&recording), [FaultKind::NonMonotoneTime]);
@@ -347,7 +339,7 @@ fn jitter_is_a_note_with_figures() {
 fn large_stamps_keep_their_digits() {
     let text = "time_us,voltage_V,speed_rad_per_s\n1700000000000000,1,2\n1700000000000001,1,3\n";
     let recording = mapped(text, &LogMap::default()).unwrap();
-    assert!((recording.runs[0].time[1] - 1e-6).abs() < 1e-18);
+    assert!((recording.runs[0].time()[1] - 1e-6).abs() < 1e-18);
 }
 
 proptest! {
@@ -369,9 +361,9 @@ proptest! {
             };
             if let Ok(recording) = map(&Source::Table(table), &INPUTS, &SIGNALS, &LogMap::default()) {
                 for run in &recording.runs {
-                    prop_assert!(run.time.windows(2).all(|w| w[0] < w[1]));
-                    prop_assert_eq!(run.time[0], 0.0);
-                    prop_assert_eq!(run.inputs.len(), run.len());
+                    prop_assert!(run.time().windows(2).all(|w| w[0] < w[1]));
+                    prop_assert_eq!(run.time()[0], 0.0);
+                    prop_assert_eq!(run.inputs().len(), run.len());
                 }
             }
         }
@@ -407,8 +399,8 @@ fn a_gain_with_a_unit_makes_another_quantity_of_a_column() {
     };
     let source = Source::Table(read_csv_from(text.as_bytes(), "log.csv").unwrap());
     let run = map(&source, &inputs, &signals, &log_map).unwrap().runs;
-    assert_eq!(run[0].inputs, [3.0, 6.0, 3.0]);
-    for (found, expected) in run[0].measured.iter().zip([0.01, 0.2, -0.005, 0.4]) {
+    assert_eq!(run[0].inputs(), [3.0, 6.0, 3.0]);
+    for (found, expected) in run[0].measured().iter().zip([0.01, 0.2, -0.005, 0.4]) {
         assert!((found - expected).abs() < 1e-15, "{found} {expected}");
     }
 
@@ -432,10 +424,10 @@ fn an_optional_input_without_a_column_is_zero() {
         let source = Source::Table(read_csv_from(text.as_bytes(), "log.csv").unwrap());
         map(&source, &inputs, &signals, &LogMap::default()).unwrap()
     };
-    assert_eq!(read(text).runs[0].inputs, [1.0, 0.0, 2.0, 0.0, 1.0, 0.0]);
+    assert_eq!(read(text).runs[0].inputs(), [1.0, 0.0, 2.0, 0.0, 1.0, 0.0]);
     let with = text
         .replace("time_s", "added_V,time_s")
         .replace('\n', "\n7,");
     let with = with.trim_end_matches("7,");
-    assert_eq!(read(with).runs[0].inputs[1], 7.0);
+    assert_eq!(read(with).runs[0].inputs()[1], 7.0);
 }

@@ -167,7 +167,7 @@ fn write(path: &Path, model: &Model, run: &Run) -> Result<(), Failure> {
     headers.extend(model.measured.iter().map(|m| header(m.signal)));
     let mut rows = Vec::with_capacity(run.len() * headers.len());
     for k in 0..run.len() {
-        rows.push(rounded(run.time[k]));
+        rows.push(rounded(run.time()[k]));
         rows.extend(
             run.input(k)
                 .iter()

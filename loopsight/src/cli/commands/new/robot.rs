@@ -100,7 +100,7 @@ fn simulate(model: &Model, text: &str, meta: &PlantMeta) -> Result<Run, Failure>
 /// away it is not the whole way.
 fn deviations(run: &Run, pace: Pace) -> Vec<f64> {
     let apart = ((pace.hold() / pace.period()) as usize).clamp(1, run.len().max(2) - 1);
-    (0..run.n_measured)
+    (0..run.n_measured())
         .map(|i| {
             let squares = (apart..run.len()).map(|k| {
                 let change = run.sample(k)[i] - run.sample(k - apart)[i];
