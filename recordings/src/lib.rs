@@ -38,6 +38,6 @@ pub use csv_write::{LogWriter, column, header, write_csv};
 pub use error::{Location, RecordingError};
 pub use fault::{Fault, FaultKind, Severity};
 pub use map::{MeasuredSignal, Recording, map};
-pub use source::{Source, read};
+pub use source::{Source, read, read_bytes};
 pub use sysid::{SysIdLog, SysIdRun, TestKind, read_sysid};
 pub use table::{ColumnName, Table, TableRun};

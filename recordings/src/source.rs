@@ -55,7 +55,12 @@ pub fn read(path: &Path) -> Result<Source, RecordingError> {
     read_bytes(&bytes, &path.display().to_string())
 }
 
-fn read_bytes(bytes: &[u8], log: &str) -> Result<Source, RecordingError> {
+/// Reads a log from the bytes of a file: as [`read`]; `log` stands for the file in messages.
+///
+/// # Errors
+///
+/// [`RecordingError`] says what is wrong and where.
+pub fn read_bytes(bytes: &[u8], log: &str) -> Result<Source, RecordingError> {
     if is_mcap(bytes) {
         return read_mcap(bytes, log).map(Source::Table);
     }

@@ -10,8 +10,8 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
+use loopsight::{CompareOptions, Log, Session};
 use loopsight_controllers as _;
-use loopsight_diagnosis::{Measurements, Work};
 use loopsight_drivers::{Limit, Simulated};
 use loopsight_estimators as _;
 use loopsight_model::config::{Source, read_text};
@@ -42,7 +42,7 @@ fn main() -> Outcome<()> {
         Ok(())
     };
 
-    let (model, _) = Model::load(&folder.join("fitted.toml"))?;
+    let model = folder.join("fitted.toml");
     for (log, names) in [
         ("prbs.csv", ["fig04.svg", "fig05.svg"]),
         ("steps.csv", ["fig06.svg", "fig07.svg"]),
@@ -75,25 +75,17 @@ fn main() -> Outcome<()> {
 }
 
 /// Figs 4 to 7: measured and free run, for each signal.
-fn against_log(model: &Model, log: &Path) -> Outcome<Vec<FigurePanel>> {
-    let source = loopsight_recordings::read(log)?;
-    let measurable: Vec<_> = model.measured.iter().map(|m| *m.signal).collect();
-    let recording =
-        loopsight_recordings::map(&source, model.plant.inputs, &measurable, &model.log)?;
-    let comparison = loopsight_diagnosis::compare(
-        model,
-        &Measurements::new(&recording.runs).with_faults(&recording.faults),
-        &Work::quiet(),
-    )?;
-    let run = comparison.runs.first().ok_or("the log has no run")?;
-    Ok(run
-        .signals
+fn against_log(model: &Path, log: &Path) -> Outcome<Vec<FigurePanel>> {
+    let session = Session::new(loopsight::Model::from_file(model)?, Log::read(log)?)?;
+    let answer = session.compare(&CompareOptions::default().series(true))?;
+    let series = answer.series.unwrap_or_default();
+    Ok(series
         .iter()
         .enumerate()
         .map(|(signal, s)| {
             let traces = vec![
-                line("measured", Style::Measured, &run.time, &s.measured),
-                line("model", Style::Model, &run.time, &s.free_run),
+                line("measured", Style::Measured, &s.time_s, &s.measured),
+                line("model", Style::Model, &s.time_s, &s.model),
             ];
             panel(signal, traces)
         })

@@ -8,6 +8,7 @@
 )]
 
 pub mod balance;
+pub mod json_schema;
 pub mod loops;
 
 use std::collections::BTreeMap;

@@ -198,6 +198,32 @@ fn sources() -> Vec<PathBuf> {
     found
 }
 
+/// The command line is a door like any other: it goes through the library `loopsight`, and takes its
+/// sentences from where they are written.
+#[test]
+fn the_command_line_looks_through_the_library_alone() {
+    let folder = repository().join("loopsight/src/cli");
+    let files: Vec<PathBuf> = sources()
+        .into_iter()
+        .filter(|path| path.starts_with(&folder))
+        .collect();
+    assert!(files.len() > 15, "{files:?}");
+    for path in files {
+        let text = std::fs::read_to_string(&path).unwrap();
+        for (number, line) in text.lines().enumerate() {
+            let code = line.split("//").next().unwrap_or("");
+            for (at, _) in code.match_indices("loopsight_") {
+                assert!(
+                    code[at..].starts_with("loopsight_report::words"),
+                    "{}:{}: {line}",
+                    path.display(),
+                    number + 1
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn no_file_is_too_long() {
     let long: Vec<String> = sources()

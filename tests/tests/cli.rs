@@ -159,7 +159,7 @@ fn a_list_names_everything_that_is_linked() {
         only.contains("ddmr") && !only.contains("coulomb_friction"),
         "{only}"
     );
-    let json = desk.json(&["list", "--json"]).to_string();
+    let json = desk.json(&["list", "--json"])["parts"].to_string();
     for id in ids {
         assert!(json.contains(&format!("\"{id}\"")), "{id}: {json}");
     }

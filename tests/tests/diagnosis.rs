@@ -6,6 +6,8 @@
     reason = "helpers of tests: a failure is the test's failure"
 )]
 
+use loopsight::answers::Verdict;
+use loopsight::{DiagnoseOptions, Log, Session};
 use loopsight_diagnosis::{Conclusion, Diagnosis, Measurements, Work, diagnose};
 use loopsight_hidden::{Experiment, Hidden, Recording, record_with};
 use loopsight_model::model::Model;
@@ -170,25 +172,9 @@ fn real_logs_show_their_friction() {
         ("denham-flywheel.json", 0.6, 0.8),
     ] {
         let path = folder.join("frc").join(file);
-        let source = loopsight_recordings::read(&path).unwrap();
-        let (mut model, _) = Model::from_toml(file, &source.model_toml().unwrap()).unwrap();
-        let signals: Vec<_> = model
-            .plant
-            .states
-            .iter()
-            .chain(model.plant.outputs)
-            .copied()
-            .collect();
-        let recording =
-            loopsight_recordings::map(&source, model.plant.inputs, &signals, &model.log).unwrap();
-        let measured: Vec<_> = recording
-            .measured
-            .iter()
-            .map(|m| (m.id.clone(), m.sensor.clone()))
-            .collect();
-        model.measure(&measured).unwrap();
-        let found = diagnose(&model, &Measurements::new(&recording.runs), &Work::quiet()).unwrap();
-        assert_eq!(found.verdict, Conclusion::EffectMissing, "{file}");
+        let session = Session::of_log(Log::read(path).unwrap()).unwrap();
+        let found = session.diagnose(&DiagnoseOptions::default()).unwrap();
+        assert_eq!(found.verdict, Verdict::EffectMissing, "{file}");
         let level = found
             .candidates
             .iter()

@@ -6,13 +6,13 @@
     reason = "what is damaged here was right, and a panic is how this program fails"
 )]
 
-use loopsight_diagnosis::{FitSettings, Measurements, Method, Work, compare, fit::fit};
+use loopsight::{CompareOptions, FitOptions, Log, Method, Session};
+use loopsight_diagnosis::{Measurements, Work, compare};
 use loopsight_model::config::Source;
 use loopsight_model::loop_file::LoopFile;
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, DriverContext, parts, plants};
 use loopsight_model::run::{Rows, Run};
-use loopsight_recordings::{map, read, read_csv_from, read_sysid};
 use loopsight_tests::{Random, repository, twil, twil_path};
 
 /// Pieces that hurt: numbers at the ends of their range, quotes, brackets, halves of characters.
@@ -209,46 +209,18 @@ fn damaged_loops_never_panic() {
 
 #[test]
 fn damaged_logs_never_panic() {
-    let model = twil();
-    let all: Vec<_> = model
-        .plant
-        .states
-        .iter()
-        .chain(model.plant.outputs)
-        .copied()
-        .collect();
+    let model = loopsight::Model::from_file(twil_path()).unwrap();
     let log = std::fs::read_to_string(repository().join("examples/twil/prbs.csv")).unwrap();
     let short: String = log.lines().take(60).map(|l| format!("{l}\n")).collect();
-    let settings = FitSettings {
-        method: Method::Rls,
-        ..FitSettings::default()
-    };
     let read = survivors(&short, 7, 400, |text| {
-        let Ok(table) = read_csv_from(text.as_bytes(), "damaged.csv") else {
+        let Ok(log) = Log::from_bytes("damaged.csv", text.as_bytes()) else {
             return false;
         };
-        let source = loopsight_recordings::Source::Table(table);
-        let Ok(recording) = map(&source, model.plant.inputs, &all, &model.log) else {
+        let Ok(session) = Session::new(model.clone(), log) else {
             return false;
         };
-        let list: Vec<_> = recording
-            .measured
-            .iter()
-            .map(|m| (m.id.clone(), m.sensor.clone()))
-            .collect();
-        let mut model = model.clone();
-        model.measure(&list).unwrap();
-        let _ = compare(
-            &model,
-            &Measurements::new(&recording.runs).with_faults(&recording.faults),
-            &Work::quiet(),
-        );
-        let _ = fit(
-            &model,
-            &Measurements::new(&recording.runs),
-            &settings,
-            &Work::quiet(),
-        );
+        let _ = session.compare(&CompareOptions::default());
+        let _ = session.fit(&FitOptions::default().method(Method::Rls));
         true
     });
     println!("{read} of 400 still read");
@@ -275,29 +247,17 @@ fn sysid() -> String {
 
 #[test]
 fn damaged_sysid_logs_never_panic() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("damaged.json");
     let text = sysid();
-    read_sysid(&text, "right.json").unwrap();
+    Log::from_bytes("right.json", text.as_bytes()).unwrap();
     let read = survivors(&text, 11, 400, |text| {
-        std::fs::write(&path, text).unwrap();
-        let Ok(source) = read(&path) else {
+        let Ok(log) = Log::from_bytes("damaged.json", text.as_bytes()) else {
             return false;
         };
-        let _ = source.table();
-        let Some(toml) = source.model_toml() else {
+        let Some(model) = log.model() else {
             return true;
         };
         // The model a log describes is one that can be read.
-        let (model, _) = Model::from_toml("made.toml", &toml).unwrap();
-        let all: Vec<_> = model
-            .plant
-            .states
-            .iter()
-            .chain(model.plant.outputs)
-            .copied()
-            .collect();
-        let _ = map(&source, model.plant.inputs, &all, &model.log);
+        let _ = Session::new(model.unwrap(), log);
         true
     });
     println!("{read} of 400 still read");

@@ -9,75 +9,66 @@
 
 use std::ops::Range;
 
-use loopsight_core::Signal;
-use loopsight_diagnosis::{
-    Comparison, Conclusion, Fit, FitSettings, Measurements, Work, compare, diagnose, fit,
-};
-use loopsight_model::model::Model;
-use loopsight_model::run::{Rows, Run};
+use loopsight::answers::{CompareAnswer, DiagnoseAnswer, FitAnswer, Verdict};
+use loopsight::{AddOptions, CompareOptions, DiagnoseOptions, FitOptions, Log, Model, Session};
 use loopsight_tests::{real_data, repository};
 
 /// The model file `name`, with what `edit` makes of its text.
 fn model(name: &str, edit: impl Fn(&str) -> String) -> Model {
     let path = repository().join("tests/fixtures/real").join(name);
     let text = edit(&std::fs::read_to_string(path).unwrap());
-    Model::from_toml(name, &text).unwrap().0
+    Model::from_toml(name, &text).unwrap()
 }
 
-/// The rows `rows` of a recording, for `model`; none where there is no data.
-fn recording(model: &mut Model, file: &str, rows: Range<usize>) -> Option<Vec<Run>> {
-    let source = loopsight_recordings::read(&real_data(file)?.join(file)).unwrap();
-    let plant = model.plant;
-    let signals: Vec<Signal> = plant.states.iter().chain(plant.outputs).copied().collect();
-    let mapped = loopsight_recordings::map(&source, plant.inputs, &signals, &model.log).unwrap();
-    let measured: Vec<_> = mapped
-        .measured
-        .into_iter()
-        .map(|m| (m.id, m.sensor))
-        .collect();
-    model.measure(&measured).unwrap();
-    let run = &mapped.runs[0];
-    let part = run.part(rows.start..rows.end.min(run.len()));
-    let start = part.time()[0];
-    let inputs = Rows::new(part.n_inputs(), part.inputs().to_vec());
-    let measured = Rows::new(part.n_measured(), part.measured().to_vec());
-    let time = part.time().iter().map(|t| t - start).collect();
-    Some(vec![Run::new(part.name(), time, inputs, measured).unwrap()])
+/// The rows `rows` of a recording; none where there is no data.
+fn recording(file: &str, rows: Range<usize>) -> Option<Log> {
+    let log = Log::read(real_data(file)?.join(file)).unwrap();
+    Some(log.part(rows))
 }
 
 const ALL: Range<usize> = 0..usize::MAX;
 
-fn fitted(model: &Model, runs: &[Run]) -> Fit {
-    let settings = FitSettings::default();
-    fit::fit(model, &Measurements::new(runs), &settings, &Work::quiet()).unwrap()
+fn session(model: &Model, log: &Log) -> Session {
+    Session::new(model.clone(), log.clone()).unwrap()
 }
 
-fn value(fit: &Fit, name: &str) -> f64 {
+fn fitted(model: &Model, log: &Log) -> FitAnswer {
+    session(model, log).fit(&FitOptions::default()).unwrap()
+}
+
+fn compared(model: &Model, log: &Log) -> CompareAnswer {
+    let options = CompareOptions::default().series(true);
+    session(model, log).compare(&options).unwrap()
+}
+
+fn diagnosed(session: &Session) -> DiagnoseAnswer {
+    session.diagnose(&DiagnoseOptions::default()).unwrap()
+}
+
+fn value(fit: &FitAnswer, name: &str) -> f64 {
     fit.parameters[name].value
 }
 
 /// Root mean square of the free-run error of the only signal.
-fn rmse(model: &Model, runs: &[Run]) -> f64 {
-    compare(model, &Measurements::new(runs), &Work::quiet())
-        .unwrap()
-        .signals[0]
-        .rmse
+fn rmse(model: &Model, log: &Log) -> f64 {
+    compared(model, log).errors.signals[0].rmse
 }
 
 /// Wigren, Schoukens (2013): the test is the first 40 650 samples, an arrowhead; a linear model leaves
 /// 14.5 mV of it, one with a cubic term 1.8 mV.
 #[test]
 fn the_silverbox_has_a_cubic_spring() {
-    let mut linear = model("silverbox.toml", str::to_owned);
+    let linear = model("silverbox.toml", str::to_owned);
     let file = "silverbox/silverbox_snls80mV.csv";
-    let Some(train) = recording(&mut linear, file, 40_700..52_700) else {
+    let Some(train) = recording(file, 40_700..52_700) else {
         return;
     };
-    let test = recording(&mut linear, file, 0..40_650).unwrap();
+    let test = recording(file, 0..40_650).unwrap();
     let plain = fitted(&linear, &train);
-    let with = linear.with_effect("cubic_stiffness", &["mass"]).unwrap();
-    let cubic = fitted(&with, &train);
-    let (before, after) = (rmse(&plain.model, &test), rmse(&cubic.model, &test));
+    let spring = AddOptions::new("cubic_stiffness").at(["mass"]);
+    let with = Session::of_model(linear).add(&spring).unwrap();
+    let cubic = fitted(with.model(), &train);
+    let (before, after) = (rmse(plain.model(), &test), rmse(cubic.model(), &test));
     println!(
         "Silverbox, free run over the arrowhead: linear {:.2} mV (published 14.5), cubic {:.2} mV \
          (published 1.8)",
@@ -88,17 +79,12 @@ fn the_silverbox_has_a_cubic_spring() {
     assert!(after < 0.0018, "{after}");
 
     // From the linear model, and from little: the spring is named.
-    let few = [train[0].part(0..6000)];
-    let ending = [test[0].part(30_000..40_000)];
-    let diagnosis = diagnose(
-        &plain.model,
-        &Measurements::new(&few).tested_on(Some(&ending)),
-        &Work::quiet(),
-    )
-    .unwrap();
+    let few = session(plain.model(), &train.part(0..6000));
+    let ending = test.part(30_000..40_000);
+    let diagnosis = diagnosed(&few.test(ending).unwrap());
     let missing = diagnosis.missing.unwrap();
     println!("Silverbox: the linear model lacks {missing:?}");
-    assert_eq!(diagnosis.verdict, Conclusion::EffectMissing);
+    assert_eq!(diagnosis.verdict, Verdict::EffectMissing);
     assert_eq!(
         (missing.effect.as_str(), &missing.at[..]),
         ("cubic_stiffness", &["mass".to_owned()][..])
@@ -111,11 +97,11 @@ fn the_silverbox_has_a_cubic_spring() {
 /// through the loop.
 #[test]
 fn emps_is_identified_through_its_loop() {
-    let mut symmetric = model("emps.toml", str::to_owned);
-    let Some(log) = recording(&mut symmetric, "emps/emps_estimation.csv", ALL) else {
+    let symmetric = model("emps.toml", str::to_owned);
+    let Some(log) = recording("emps/emps_estimation.csv", ALL) else {
         return;
     };
-    let pulses = recording(&mut symmetric, "emps/emps_validation_pulses.csv", ALL).unwrap();
+    let pulses = recording("emps/emps_validation_pulses.csv", ALL).unwrap();
     let found = fitted(&symmetric, &log);
     for (name, published) in [
         ("mass", 95.11),
@@ -131,7 +117,7 @@ fn emps_is_identified_through_its_loop() {
         );
         assert!(off.abs() < 0.01, "{name}: {off}");
     }
-    let mut directional = model("emps.toml", |text| {
+    let directional = model("emps.toml", |text| {
         text.replace("coulomb_friction]", "directional_friction]")
             .replace(
                 "level = 10.0",
@@ -144,12 +130,11 @@ fn emps_is_identified_through_its_loop() {
                 "[\"velocity_lag\"]\nfixed = [\"viscous_friction\"]",
             )
     });
-    directional.measured.clone_from(&symmetric.measured);
     let directed = fitted(&directional, &log);
-    let errors = |fit: &Fit| {
-        [&log, &pulses].map(|runs| {
-            let held = compare(&fit.model, &Measurements::new(runs), &Work::quiet()).unwrap();
-            [relative(&held, |x| x.to_vec()), relative(&held, low_pass)]
+    let errors = |fit: &FitAnswer| {
+        [&log, &pulses].map(|log| {
+            let found = compared(fit.model(), log);
+            [relative(&found, |x| x.to_vec()), relative(&found, low_pass)]
         })
     };
     let (of_one, of_two) = (errors(&found), errors(&directed));
@@ -173,9 +158,9 @@ fn emps_is_identified_through_its_loop() {
 }
 
 /// `‖F - F̂‖/‖F‖` of the only signal, both seen through `filter`.
-fn relative(held: &Comparison, filter: impl Fn(&[f64]) -> Vec<f64>) -> f64 {
-    let trace = &held.runs[0].signals[0];
-    let (measured, predicted) = (filter(&trace.measured), filter(&trace.free_run));
+fn relative(found: &CompareAnswer, filter: impl Fn(&[f64]) -> Vec<f64>) -> f64 {
+    let series = &found.series.as_ref().unwrap()[0];
+    let (measured, predicted) = (filter(&series.measured), filter(&series.model));
     let square = |x: f64| x * x;
     let off: f64 = measured
         .iter()
@@ -214,12 +199,12 @@ fn low_pass(signal: &[f64]) -> Vec<f64> {
 #[test]
 fn a_geared_motor_has_a_threshold() {
     let file = "dc-motor-deadzone/dc_motor_staircase.csv";
-    let mut plain = model("geared_motor.toml", str::to_owned);
-    let Some(log) = recording(&mut plain, file, ALL) else {
+    let plain = model("geared_motor.toml", str::to_owned);
+    let Some(log) = recording(file, ALL) else {
         return;
     };
-    let diagnosis = diagnose(&plain, &Measurements::new(&log), &Work::quiet()).unwrap();
-    assert_eq!(diagnosis.verdict, Conclusion::EffectMissing);
+    let diagnosis = diagnosed(&session(&plain, &log));
+    assert_eq!(diagnosis.verdict, Verdict::EffectMissing);
     let best = &diagnosis.candidates[0];
     let alike = best.indistinguishable_from.iter();
     let class: Vec<&str> = std::iter::once(&best.place)
@@ -230,8 +215,7 @@ fn a_geared_motor_has_a_threshold() {
     let thresholds = ["dead_zone", "coulomb_friction"];
     assert!(thresholds.iter().all(|id| class.contains(id)), "{class:?}");
     let with = |effects: &str| {
-        let mut with = model("geared_motor.toml", |text| format!("{text}\n{effects}"));
-        with.measured.clone_from(&plain.measured);
+        let with = model("geared_motor.toml", |text| format!("{text}\n{effects}"));
         let found = fitted(&with, &log);
         println!(
             "geared motor with\n{effects}  error {:.2} %",

@@ -21,33 +21,33 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Begin: a folder for a robot, or a crate with a plant and an effect of your own.
-    New(NewOptions),
+    New(NewArguments),
     /// Check model, loop and experiment files, and logs, without doing anything with them.
-    Check(CheckOptions),
+    Check(CheckArguments),
     /// List the known plants, effects, estimators, controllers and drivers.
-    List(ListOptions),
+    List(ListArguments),
     /// Explain one of them: equation, parameters, channels, reference, example.
-    Explain(ExplainOptions),
+    Explain(ExplainArguments),
     /// Drive a simulated robot with an experiment and write its log.
-    Simulate(SimulateOptions),
+    Simulate(SimulateArguments),
     /// Hold a model against a log: free run and one-step prediction.
-    Compare(CompareOptions),
+    Compare(CompareArguments),
     /// Find the parameters of a model from a log, with intervals.
-    Fit(FitOptions),
+    Fit(FitArguments),
     /// Find out which physical effect a model lacks.
-    Diagnose(DiagnoseOptions),
+    Diagnose(DiagnoseArguments),
     /// Plan the experiment that separates two effects or pins a parameter.
-    Experiment(ExperimentOptions),
+    Experiment(ExperimentArguments),
     /// Add an effect to a model file, with neutral parameters.
-    Add(AddOptions),
+    Add(AddArguments),
     /// Diagnose, add, refit, until nothing more is missing.
-    Improve(ImproveOptions),
+    Improve(ImproveArguments),
     /// Bring a robot up: is it wired as the files say? Step by step, wheels in the air.
-    Bringup(BringupOptions),
+    Bringup(BringupArguments),
     /// Run a control loop.
-    Run(RunOptions),
+    Run(RunArguments),
     /// Tell a robot, waiting or driving, the model, effects and law of a loop file.
-    Send(SendOptions),
+    Send(SendArguments),
     /// Print a completion script for a shell.
     Completions {
         /// The shell.
@@ -57,7 +57,7 @@ pub(crate) enum Command {
 
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("kind").required(true).args(["plant", "rust"])))]
-pub(crate) struct NewOptions {
+pub(crate) struct NewArguments {
     /// The folder to make; it must not exist yet.
     pub(crate) folder: PathBuf,
     /// Files for a robot of this plant: model, experiment, loop; `loopsight list plants` shows them.
@@ -73,14 +73,17 @@ pub(crate) struct NewOptions {
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct CheckOptions {
+pub(crate) struct CheckArguments {
     /// Model, loop or experiment files (TOML), or logs (CSV, SysId JSON).
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct ListOptions {
+pub(crate) struct ListArguments {
     /// Only these: plants, effects, estimators, controllers or drivers.
     #[arg(value_enum)]
     pub(crate) role: Option<RoleName>,
@@ -99,13 +102,16 @@ pub(crate) enum RoleName {
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct ExplainOptions {
+pub(crate) struct ExplainArguments {
     /// Id of a plant, an effect, an estimator, a controller or a driver.
     pub(crate) id: String,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct SimulateOptions {
+pub(crate) struct SimulateArguments {
     /// Model file of the robot.
     pub(crate) model: PathBuf,
     /// Experiment file: inputs, duration, period, sensors' noise.
@@ -113,17 +119,23 @@ pub(crate) struct SimulateOptions {
     /// The log to write (CSV).
     #[arg(short, long, value_name = "LOG")]
     pub(crate) output: PathBuf,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]
 #[command(override_usage = "loopsight compare [OPTIONS] [MODEL] <LOG>")]
-pub(crate) struct CompareOptions {
+pub(crate) struct CompareArguments {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
+    /// With --json, the series too: time, measured, model and residual of each run and signal.
+    #[arg(long, requires = "json")]
+    pub(crate) series: bool,
     /// Write a page with pictures; opens offline in any browser.
     #[arg(long, value_name = "FILE")]
     pub(crate) html: Option<PathBuf>,
@@ -131,7 +143,7 @@ pub(crate) struct CompareOptions {
 
 #[derive(Debug, Args)]
 #[command(override_usage = "loopsight fit [OPTIONS] [MODEL] <LOG>")]
-pub(crate) struct FitOptions {
+pub(crate) struct FitArguments {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
@@ -153,6 +165,9 @@ pub(crate) struct FitOptions {
     /// JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
+    /// With --json, the series too: time, measured, model and residual of each run and signal.
+    #[arg(long, requires = "json")]
+    pub(crate) series: bool,
     /// Write a page with pictures; opens offline in any browser.
     #[arg(long, value_name = "FILE")]
     pub(crate) html: Option<PathBuf>,
@@ -176,7 +191,7 @@ pub(crate) enum SchemeName {
 
 #[derive(Debug, Args)]
 #[command(override_usage = "loopsight diagnose [OPTIONS] [MODEL] <LOG>")]
-pub(crate) struct DiagnoseOptions {
+pub(crate) struct DiagnoseArguments {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
@@ -189,13 +204,16 @@ pub(crate) struct DiagnoseOptions {
     /// JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
+    /// With --json, the series too: time, measured, model and residual of each run and signal.
+    #[arg(long, requires = "json")]
+    pub(crate) series: bool,
     /// Write a page with pictures; opens offline in any browser.
     #[arg(long, value_name = "FILE")]
     pub(crate) html: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct ExperimentOptions {
+pub(crate) struct ExperimentArguments {
     /// Model file, with values: the experiment is planned around them.
     pub(crate) model: PathBuf,
     /// Two effects to tell apart, each as `EFFECT` or `EFFECT@CHANNEL+CHANNEL`; `nothing` as the
@@ -225,7 +243,7 @@ pub(crate) struct ExperimentOptions {
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct AddOptions {
+pub(crate) struct AddArguments {
     /// Model file.
     pub(crate) model: PathBuf,
     /// Id of the effect; `loopsight list effects` shows them.
@@ -236,11 +254,14 @@ pub(crate) struct AddOptions {
     /// The model file to write.
     #[arg(short, long, value_name = "NEW")]
     pub(crate) output: PathBuf,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]
 #[command(override_usage = "loopsight improve [OPTIONS] [MODEL] <LOG>")]
-pub(crate) struct ImproveOptions {
+pub(crate) struct ImproveArguments {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
@@ -256,13 +277,16 @@ pub(crate) struct ImproveOptions {
     /// JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
+    /// With --json, the series too: time, measured, model and residual of each run and signal.
+    #[arg(long, requires = "json")]
+    pub(crate) series: bool,
     /// Write a page with pictures; opens offline in any browser.
     #[arg(long, value_name = "FILE")]
     pub(crate) html: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct RunOptions {
+pub(crate) struct RunArguments {
     /// Loop file.
     #[arg(value_name = "LOOP")]
     pub(crate) file: PathBuf,
@@ -273,6 +297,9 @@ pub(crate) struct RunOptions {
     /// JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
+    /// With --json, the series too: time, references, signals, inputs and parameters, tick by tick.
+    #[arg(long, requires = "json")]
+    pub(crate) series: bool,
     /// Write a page with pictures; opens offline in any browser.
     #[arg(long, value_name = "FILE")]
     pub(crate) html: Option<PathBuf>,
@@ -282,7 +309,7 @@ pub(crate) struct RunOptions {
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct SendOptions {
+pub(crate) struct SendArguments {
     /// Loop file, its law in [controller.aboard].
     #[arg(value_name = "LOOP")]
     pub(crate) file: PathBuf,
@@ -296,7 +323,7 @@ pub(crate) struct SendOptions {
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct BringupOptions {
+pub(crate) struct BringupArguments {
     /// Loop file; its [limits] have to say how large each input may be.
     #[arg(value_name = "LOOP")]
     pub(crate) file: PathBuf,

@@ -13,7 +13,8 @@
 mod arguments;
 mod commands;
 mod failure;
-mod load;
+mod files;
+mod interrupt;
 mod output;
 mod progress;
 
@@ -22,7 +23,8 @@ use std::process::ExitCode;
 use clap::Parser as _;
 
 use arguments::{Arguments, Command};
-use failure::Failure;
+
+use crate::error::Result;
 
 /// Runs the command with the arguments of the process.
 pub fn run() -> ExitCode {
@@ -41,15 +43,15 @@ pub fn run() -> ExitCode {
     };
     match execute(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            failure.print();
-            ExitCode::from(failure.status())
+        Err(error) => {
+            failure::print(&error);
+            ExitCode::from(error.exit_status())
         }
     }
 }
 
-fn execute(arguments: &Arguments) -> Result<(), Failure> {
-    loopsight_model::registry::check().map_err(|e| Failure::work(e.to_string()))?;
+fn execute(arguments: &Arguments) -> Result<()> {
+    crate::model::check_registry()?;
     match &arguments.command {
         Command::New(options) => commands::new::run(options),
         Command::Check(options) => commands::check::run(options),

@@ -2,14 +2,10 @@
 
 use std::io::Write as _;
 
-use loopsight_diagnosis::{
-    Comparison, Estimate, Fit, Held, Place, ResidualForce, Statement, Verdict,
-};
-use loopsight_recordings::{Fault, Severity};
-use loopsight_report::ASTRAY;
-use serde::Serialize;
-
-use crate::cli::failure::Failure;
+use crate::answers::{Answer, Correction, Estimates, Failing, LogFault, MissingForce, ModelErrors};
+use crate::answers::{FitAnswer, ParameterEstimate, ParameterVerdict, Severity};
+use crate::error::Result;
+use crate::words::{number, percent};
 
 /// Something for the person at the terminal that is not the result: standard error.
 pub(crate) fn note(text: &str) {
@@ -23,16 +19,15 @@ pub(crate) fn result(text: &str) {
     let _ = out.write_all(b"\n");
 }
 
-/// The result as JSON, and nothing else, on standard output.
-pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| Failure::work(e.to_string()))?;
-    result(&text);
+/// An answer: as text on standard output, or as JSON there and the text on standard error.
+pub(crate) fn answer(answer: &impl Answer, text: &str, json: bool) -> Result<()> {
+    if json {
+        note(text);
+        result(&answer.to_json()?);
+    } else {
+        result(text);
+    }
     Ok(())
-}
-
-/// Text for people: to standard output, or to standard error when that is taken by JSON.
-pub(crate) fn people(text: &str, json: bool) {
-    if json { note(text) } else { result(text) }
 }
 
 /// A table with columns aligned: the first to the left, the others to the right.
@@ -72,44 +67,11 @@ fn aligned(head: &[&str], rows: &[Vec<String>], left: usize) -> String {
     lines.join("\n")
 }
 
-/// An effect and where it is.
-pub(crate) fn place(place: &Place) -> String {
-    format!("{} @ {}", place.effect, place.at.join("+"))
-}
-
-/// Six significant digits, without needless zeros.
-pub(crate) fn number(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let magnitude = value.abs().log10().floor();
-    if !(-4.0..7.0).contains(&magnitude) {
-        return format!("{value:.4e}");
-    }
-    let decimals = (5.0 - magnitude).max(0.0) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    }
-}
-
-/// Per cent with a sensible number of digits.
-pub(crate) fn percent(value: f64) -> String {
-    if value.is_nan() {
-        "-".to_owned()
-    } else if value > ASTRAY {
-        format!("> {:.0} %", 100.0 * ASTRAY)
-    } else {
-        format!("{:.2} %", 100.0 * value)
-    }
-}
-
-pub(crate) fn faults(faults: &[Fault]) -> String {
+/// A line for each fault.
+pub(crate) fn faults(faults: &[LogFault]) -> String {
     let mut text = String::new();
     for fault in faults {
-        let word = match fault.severity() {
+        let word = match fault.severity {
             Severity::Note => "note",
             Severity::Warning => "warning",
             Severity::Fatal => "fault",
@@ -120,7 +82,7 @@ pub(crate) fn faults(faults: &[Fault]) -> String {
 }
 
 /// What is known of a force that the library does not have.
-pub(crate) fn residual_force(force: &ResidualForce) -> String {
+pub(crate) fn residual_force(force: &MissingForce) -> String {
     let mut text = format!("\nresidual force: {}", force.statement);
     if let Some(expression) = &force.expression {
         text.push_str(&format!(
@@ -131,8 +93,9 @@ pub(crate) fn residual_force(force: &ResidualForce) -> String {
     text
 }
 
-pub(crate) fn comparison(comparison: &Comparison) -> String {
-    let rows: Vec<Vec<String>> = comparison
+/// The errors of a model; `summary` says them in words.
+pub(crate) fn errors(errors: &ModelErrors, summary: &str) -> String {
+    let rows: Vec<Vec<String>> = errors
         .signals
         .iter()
         .map(|s| {
@@ -145,31 +108,29 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
             ]
         })
         .collect();
-    let failures = where_it_fails(&comparison.where_it_fails);
     format!(
-        "{}free run: error {} of the standard deviation, fit {:.2} %\n{}{}{failures}",
-        faults(&comparison.faults),
-        percent(comparison.nrmse),
-        comparison.fit_percent,
-        held(comparison.observer.as_ref()),
-        table(&["signal", "rmse", "nrmse", "fit", "one-step nrmse"], &rows)
+        "{}{summary}\n{}{}{}",
+        faults(&errors.faults),
+        correction(errors.observer.as_ref()),
+        table(&["signal", "rmse", "nrmse", "fit", "one-step nrmse"], &rows),
+        where_it_fails(&errors.where_it_fails)
     )
 }
 
 /// Where a model fails: a line for each statement.
-pub(crate) fn where_it_fails(statements: &[Statement]) -> String {
+pub(crate) fn where_it_fails(statements: &[Failing]) -> String {
     statements
         .iter()
         .map(|s| format!("\nwhere it fails: {}", s.statement))
         .collect()
 }
 
-/// That a free run was held to the measurements, where it was; with a line's end.
-pub(crate) fn held(observer: Option<&Held>) -> String {
-    observer.map_or_else(String::new, |held| format!("note: {}\n", held.statement))
+/// That a free run was corrected by the measurements, where it was; with a line's end.
+pub(crate) fn correction(correction: Option<&Correction>) -> String {
+    correction.map_or_else(String::new, |c| format!("note: {}\n", c.statement))
 }
 
-fn estimate((name, p): (&String, &Estimate)) -> Vec<String> {
+fn estimate((name, p): (&String, &ParameterEstimate)) -> Vec<String> {
     vec![
         name.clone(),
         number(p.value),
@@ -183,15 +144,16 @@ fn estimate((name, p): (&String, &Estimate)) -> Vec<String> {
     ]
 }
 
-pub(crate) fn fit(fit: &Fit) -> String {
-    let rows: Vec<Vec<String>> = fit.parameters.iter().map(estimate).collect();
+/// Parameters with intervals, and what the data say of them.
+pub(crate) fn parameters(parameters: &Estimates, flat: &[String], derived: &Estimates) -> String {
+    let rows: Vec<Vec<String>> = parameters.iter().map(estimate).collect();
     let mut text = table(
         &["parameter", "value", "unit", "std error", "95 % interval"],
         &rows,
     );
     // Below the table: beside it, they would make it wider than a terminal.
-    let mut verdicts: Vec<(Verdict, Vec<&str>)> = Vec::new();
-    for (name, p) in &fit.parameters {
+    let mut verdicts: Vec<(ParameterVerdict, Vec<&str>)> = Vec::new();
+    for (name, p) in parameters {
         match verdicts
             .iter_mut()
             .find(|(verdict, _)| *verdict == p.verdict)
@@ -203,21 +165,21 @@ pub(crate) fn fit(fit: &Fit) -> String {
     for (verdict, names) in &verdicts {
         text.push_str(&format!("\n{}: {}", verdict.text(), names.join(", ")));
     }
-    for flat in &fit.flat {
+    for flat in flat {
         text.push_str(&format!("\nnot determined: {flat}"));
     }
-    if !fit.derived.is_empty() {
-        let rows: Vec<Vec<String>> = fit.derived.iter().map(estimate).collect();
+    if !derived.is_empty() {
+        let rows: Vec<Vec<String>> = derived.iter().map(estimate).collect();
         let head = ["from these", "value", "unit", "std error", "95 % interval"];
         text.push_str(&format!("\n\n{}", table(&head, &rows)));
     }
-    text.push_str(&format!(
-        "\n\nerror on the fitted log: {}{}",
-        fit.nrmse_before
-            .map_or_else(String::new, |b| format!("{} before, ", percent(b))),
-        percent(fit.nrmse_fit)
-    ));
     text
+}
+
+/// A fit: its parameters, and what it came to.
+pub(crate) fn fit(fit: &FitAnswer) -> String {
+    let parameters = parameters(&fit.parameters, &fit.flat, &fit.derived);
+    format!("{parameters}\n\n{}", fit.summary)
 }
 
 /// The command as it was typed, for the foot of a page.

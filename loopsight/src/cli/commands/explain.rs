@@ -1,51 +1,50 @@
 //! `loopsight explain`.
 
-use loopsight_core::{EffectMeta, Parameter, PlantMeta, Signal};
-use loopsight_model::config::nearest;
-use loopsight_model::model::misfit;
-use loopsight_model::registry::{self, PartMeta, range_text};
-
-use crate::cli::arguments::ExplainOptions;
-use crate::cli::failure::Failure;
+use crate::answers::{Explained, ExplainedParameter, ExplainedSignal};
+use crate::cli::arguments::ExplainArguments;
 use crate::cli::output::{self, columns};
+use crate::error::Result;
+use crate::explain;
 
-pub(crate) fn run(options: &ExplainOptions) -> Result<(), Failure> {
-    let id = options.id.as_str();
-    let text = if let Some(meta) = registry::plants().into_iter().find(|m| m.id == id) {
-        plant(meta)
-    } else if let Some(meta) = registry::effects().into_iter().find(|m| m.id == id) {
-        effect(meta)
-    } else if let Some(meta) = registry::parts().into_iter().find(|m| m.id == id) {
-        part(meta)
-    } else if let Some(text) = written(id) {
-        text
-    } else {
-        let mut ids: Vec<&str> = registry::plants().iter().map(|m| m.id).collect();
-        ids.extend(registry::effects().iter().map(|m| m.id));
-        ids.extend(registry::parts().iter().map(|m| m.id));
-        ids.push(registry::written()[0].id);
-        let mut message = format!("nothing is known by the id `{id}`");
-        match nearest(id, ids.iter().copied()) {
-            Some(near) => message.push_str(&format!("; did you mean `{near}`?")),
-            None => message.push_str(&format!("; known are {}", ids.join(", "))),
-        }
-        return Err(Failure::request(message));
-    };
-    output::result(text.trim_end());
-    Ok(())
+pub(crate) fn run(arguments: &ExplainArguments) -> Result<()> {
+    let answer = explain(&arguments.id)?;
+    let texts: Vec<String> = answer.parts.iter().map(text).collect();
+    output::answer(&answer, texts.join("\n").trim_end(), arguments.json)
 }
 
-fn head(role: &str, id: &str, summary: &str, equation: &str) -> String {
-    let equation = equation.replace(";  ", "\n    ");
-    format!("{id} ({role}): {summary}\n\n    {equation}\n")
+fn text(part: &Explained) -> String {
+    let mut text = format!(
+        "{} ({}): {}\n\n    {}\n",
+        part.id,
+        part.role,
+        part.summary,
+        part.equation.replace('\n', "\n    ")
+    );
+    text.push_str(&match part.role {
+        "plant" if part.assumptions.is_some() => plant(part),
+        "effect" if part.symptom.is_some() => effect(part),
+        _ => settings(part),
+    });
+    let example = part.example.lines().map(|l| format!("    {l}\n"));
+    text.push_str(&format!(
+        "\nReference: {}\n\nExample:\n{}",
+        part.reference,
+        example.collect::<String>()
+    ));
+    text
 }
 
-fn tail(reference: &str, example: &str) -> String {
-    let example: String = example.lines().map(|l| format!("    {l}\n")).collect();
-    format!("\nReference: {reference}\n\nExample:\n{example}")
+/// A row of texts.
+fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
+    cells.map(str::to_owned).to_vec()
 }
 
-fn parameters(title: &str, list: &[Parameter]) -> String {
+/// A table under a title.
+fn titled(title: &str, head: &[&str], rows: &[Vec<String>]) -> String {
+    format!("\n{title}\n{}\n", columns(head, rows))
+}
+
+fn parameters(title: &str, list: &[ExplainedParameter]) -> String {
     let rows: Vec<Vec<String>> = list
         .iter()
         .map(|p| {
@@ -56,138 +55,85 @@ fn parameters(title: &str, list: &[Parameter]) -> String {
                 p.unit.to_owned(),
                 default,
                 estimated.to_owned(),
-                format!("{}; {}", p.doc, range_text(p)),
+                format!("{}; {}", p.doc, p.range),
             ]
         })
         .collect();
-    format!(
-        "\n{title}\n{}\n",
-        columns(&["name", "unit", "default", "in a fit", "what"], &rows)
+    titled(
+        title,
+        &["name", "unit", "default", "in a fit", "what"],
+        &rows,
     )
 }
 
-fn signals(title: &str, list: &[Signal]) -> String {
+fn signals(title: &str, list: &[ExplainedSignal]) -> String {
     if list.is_empty() {
         return String::new();
     }
     let rows: Vec<Vec<String>> = list
         .iter()
-        .map(|s| {
-            vec![
-                format!("{} ({})", s.id, s.symbol),
-                s.unit.to_owned(),
-                s.doc.to_owned(),
-            ]
-        })
+        .map(|s| row([&format!("{} ({})", s.id, s.symbol), s.unit, s.doc]))
         .collect();
-    format!("\n{title}\n{}\n", columns(&["name", "unit", "what"], &rows))
+    titled(title, &["name", "unit", "what"], &rows)
 }
 
-fn plant(meta: &PlantMeta) -> String {
-    let mut text = head("plant", meta.id, meta.summary, meta.equation);
-    text.push_str(&format!("\nAssumptions: {}\n", meta.assumptions));
-    text.push_str(&signals("States", meta.states));
-    text.push_str(&signals("Inputs", meta.inputs));
-    text.push_str(&signals("Further signals", meta.outputs));
-    text.push_str(&parameters("Parameters", meta.parameters));
-    for set in meta.parameterizations {
+fn plant(part: &Explained) -> String {
+    let mut text = format!("\nAssumptions: {}\n", part.assumptions.unwrap_or_default());
+    text.push_str(&signals("States", &part.states));
+    text.push_str(&signals("Inputs", &part.inputs));
+    text.push_str(&signals("Further signals", &part.outputs));
+    text.push_str(&parameters("Parameters", &part.parameters));
+    for set in &part.parameterizations {
         let title = format!(
             "Parameters in [plant.{}.{}]: {}",
-            meta.id, set.id, set.summary
+            part.id, set.id, set.summary
         );
-        text.push_str(&parameters(&title, set.parameters));
+        text.push_str(&parameters(&title, &set.parameters));
     }
-    let derived = registry::derived(meta.id);
-    if !derived.is_empty() {
-        let rows: Vec<Vec<String>> = derived
+    if !part.derived.is_empty() {
+        let rows: Vec<Vec<String>> = part
+            .derived
             .iter()
-            .map(|d| {
-                [d.id, d.unit, d.equation, d.doc]
-                    .map(str::to_owned)
-                    .to_vec()
-            })
+            .map(|d| row([d.id, d.unit, d.equation, d.doc]))
             .collect();
-        let head = columns(&["name", "unit", "equation", "what"], &rows);
-        text.push_str(&format!(
-            "\nWhat follows from them, shown with a fit\n{head}\n"
+        let head = ["name", "unit", "equation", "what"];
+        text.push_str(&titled(
+            "What follows from them, shown with a fit",
+            &head,
+            &rows,
         ));
     }
-    let effects = registry::effects();
-    let rows: Vec<Vec<String>> = meta
+    let rows: Vec<Vec<String>> = part
         .channels
         .iter()
-        .map(|c| {
-            let fitting: Vec<&str> = effects
-                .iter()
-                .filter(|e| misfit(c, e).is_none())
-                .map(|e| e.id)
-                .collect();
-            vec![
-                c.id.to_owned(),
-                c.place.kind().name().to_owned(),
-                c.unit.to_owned(),
-                c.equation.to_owned(),
-                fitting.join(", "),
-            ]
-        })
+        .map(|c| row([c.id, c.place, c.unit, c.equation, &c.effects.join(", ")]))
         .collect();
-    text.push_str(&format!(
-        "\nChannels, where effects attach\n{}\n",
-        columns(
-            &["name", "place", "unit", "equation", "effects that fit"],
-            &rows
-        )
-    ));
-    text.push_str(&tail(meta.reference, meta.example));
+    let head = ["name", "place", "unit", "equation", "effects that fit"];
+    text.push_str(&titled("Channels, where effects attach", &head, &rows));
     text
 }
 
-fn effect(meta: &EffectMeta) -> String {
-    let mut text = head("effect", meta.id, meta.summary, meta.equation);
-    text.push_str(&format!(
+fn effect(part: &Explained) -> String {
+    let mut text = format!(
         "\nSymptom: {}\nRemedy: {}\n",
-        meta.symptom, meta.remedy
-    ));
-    text.push_str(&parameters("Parameters", meta.parameters));
-    let rows: Vec<Vec<String>> = registry::plants()
+        part.symptom.unwrap_or_default(),
+        part.remedy.unwrap_or_default()
+    );
+    text.push_str(&parameters("Parameters", &part.parameters));
+    let rows: Vec<Vec<String>> = part
+        .attaches_to
         .iter()
-        .map(|p| {
-            let channels: Vec<&str> = p
-                .channels
-                .iter()
-                .filter(|c| misfit(c, meta).is_none())
-                .map(|c| c.id)
-                .collect();
-            vec![p.id.to_owned(), channels.join(", ")]
-        })
-        .filter(|r| !r[1].is_empty())
+        .map(|home| row([home.plant, &home.channels.join(", ")]))
         .collect();
-    text.push_str(&format!(
-        "\nWhere it attaches\n{}\n",
-        columns(&["plant", "channels"], &rows)
-    ));
-    text.push_str(&tail(meta.reference, meta.example));
+    text.push_str(&titled("Where it attaches", &["plant", "channels"], &rows));
     text
 }
 
-/// What a model file itself can define: a plant and an effect share their id.
-fn written(id: &str) -> Option<String> {
-    let found = registry::written().into_iter().filter(|m| m.id == id);
-    let texts: Vec<String> = found.map(part).collect();
-    (!texts.is_empty()).then(|| texts.join("\n"))
-}
-
-fn part(meta: &PartMeta) -> String {
-    let mut text = head(meta.role, meta.id, meta.summary, meta.equation);
-    let rows: Vec<Vec<String>> = meta
+fn settings(part: &Explained) -> String {
+    let rows: Vec<Vec<String>> = part
         .settings
         .iter()
-        .map(|s| vec![s.id.to_owned(), s.unit.to_owned(), s.doc.to_owned()])
+        .map(|s| row([s.id, s.unit, s.doc]))
         .collect();
-    text.push_str(&format!(
-        "\nSettings\n{}\n",
-        columns(&["name", "unit", "what"], &rows)
-    ));
-    text.push_str(&tail(meta.reference, meta.example));
-    text
+    titled("Settings", &["name", "unit", "what"], &rows)
 }

@@ -1,18 +1,23 @@
 //! `loopsight new`: a starting point that runs at once.
 
-mod folder;
-mod model_text;
-mod pace;
-mod robot;
-mod texts;
-mod workshop;
+use crate::cli::arguments::NewArguments;
+use crate::cli::{files, output};
+use crate::error::Result;
+use crate::scaffold::{robot, workshop};
 
-use crate::cli::arguments::NewOptions;
-use crate::cli::failure::Failure;
-
-pub(crate) fn run(options: &NewOptions) -> Result<(), Failure> {
-    match &options.plant {
-        Some(plant) => robot::write(&options.folder, plant),
-        None => workshop::write(&options.folder, options.loopsight.as_deref()),
+pub(crate) fn run(arguments: &NewArguments) -> Result<()> {
+    let made = match &arguments.plant {
+        Some(plant) => robot(&arguments.folder, plant)?,
+        None => workshop(&arguments.folder, arguments.loopsight.as_deref())?,
+    };
+    made.written.iter().for_each(|path| files::wrote(path));
+    if let Some(note) = &made.note {
+        output::note(note);
     }
+    output::result(&format!(
+        "next:\n  cd {}\n  {}",
+        arguments.folder.display(),
+        made.next.join("\n  ")
+    ));
+    Ok(())
 }

@@ -1,263 +1,195 @@
 //! `loopsight run`.
 
-mod dashboard;
-mod recorder;
-mod summary;
-mod timing;
+use std::sync::{Arc, Mutex};
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use super::dashboard::Dashboard;
+use crate::answers::{Happened, LearnedParameter, RunAnswer};
+use crate::cli::arguments::RunArguments;
+use crate::cli::{files, interrupt, output};
+use crate::error::Result;
+use crate::words::{number, percent};
+use crate::{LogTo, Loop, RunOptions, Session};
 
-use dashboard::Dashboard;
-use loopsight_core::TickError;
-use loopsight_model::config::{Source, read_text};
-use loopsight_model::loop_file::{Composed, LoopFile};
-use loopsight_model::model::Model;
-use loopsight_model::registry::{BuildError, DriverContext};
-use loopsight_recordings::{LogWriter, RecordingError};
-use loopsight_report::{Context, LoopRecord, figure_svg, run_figure, run_page, save};
-use recorder::Recorder;
-use summary::Summary;
+/// Events that are told at the end; the page has more, the log all.
+const MOST_TOLD: usize = 20;
 
-use crate::cli::arguments::RunOptions;
-use crate::cli::failure::{self, Failure};
-use crate::cli::{load, output};
-
-pub(crate) fn run(options: &RunOptions) -> Result<(), Failure> {
-    let text = read_text(&options.file)?;
-    let source = Source::parse(&options.file.display().to_string(), &text)?;
-    let file = LoopFile::parse(&source)?;
-    let (model, mut composed) = compose(&options.file, &source, &file)?;
-    let log_path = options
-        .output
-        .clone()
-        .or_else(|| file.log.as_ref().map(|l| beside(&options.file, l)));
-    for path in log_path.iter().chain(&options.html).chain(&options.svg) {
-        load::writable(path)?;
+pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
+    let control = Loop::from_file(&arguments.file)?;
+    let session = Session::of_model(control.model()?);
+    for path in arguments.html.iter().chain(&arguments.svg) {
+        files::writable(path)?;
     }
-    // The timer of a robot that runs the law itself is not the host's to measure.
-    let real_time = (file.real_time || !file.driver.is_simulated()) && !file.driver.runs_law();
-    let mut recorder = Recorder::new(&model, &composed, file.period_s, real_time);
-    let mut log = match &log_path {
-        None => None,
-        Some(path) => Some(
-            LogWriter::create(path, &recorder.headers(&model, &composed))
-                .map_err(|e| failure::recording(path, &e))?,
-        ),
+    let dashboard = Arc::new(Mutex::new(Dashboard::new()));
+    let shown = Arc::clone(&dashboard);
+    let log = arguments.output.clone();
+    let options = RunOptions::default()
+        .log(log.map_or(LogTo::AsWritten, LogTo::File))
+        .series(arguments.series)
+        .stopped_by("Ctrl-C")
+        .cancel(&interrupt::token())
+        .on_tick(move |view| {
+            if let Ok(mut dashboard) = shown.lock() {
+                dashboard.take(view);
+            }
+        });
+    let answer = session.run(&control, &options);
+    if let Ok(mut dashboard) = dashboard.lock() {
+        let _ = dashboard.clear();
+    }
+    let answer = answer?;
+    if let Some(path) = answer.log_written() {
+        files::wrote(path);
+    }
+    output::answer(&answer, &text(&answer), arguments.json)?;
+    if let Some(path) = &arguments.svg {
+        files::save(path, &answer.svg())?;
+    }
+    if let Some(path) = &arguments.html {
+        files::save(path, &answer.page(&output::command_line()))?;
+    }
+    answer.failure().map_or(Ok(()), Err)
+}
+
+fn text(run: &RunAnswer) -> String {
+    let with_unit = |value: Option<f64>, unit: &str| match value {
+        Some(value) => format!("{} {unit}", number(value)),
+        None => "-".to_owned(),
     };
-    let end = drive(&file, &mut composed, &mut recorder, log.as_mut());
-    if let Some(log) = log {
-        let path = log_path.as_deref().unwrap_or(Path::new(""));
-        let path = log.finish().map_err(|e| failure::recording(path, &e))?;
-        output::note(&format!("wrote {}", path.display()));
-    }
-    recorder.record.end = end.text.clone();
-    promise(&file, &mut recorder.record);
-    let mut summary = Summary::new(&recorder, log_path);
-    summary.notes.extend(composed.notes.iter().cloned());
-    summary.notes.extend(summary.reached());
-    output::people(&summary.text(), options.json);
-    if options.json {
-        output::json(&summary)?;
-    }
-    let title = file.name.clone().unwrap_or_else(|| model.name.clone());
-    let mut record = recorder.record;
-    record.notes.clone_from(&summary.notes);
-    if let Some(path) = &options.svg {
-        save(path, &figure_svg(&run_figure(&title, &record)))?;
-        output::note(&format!("wrote {}", path.display()));
-    }
-    if let Some(path) = &options.html {
-        let context = Context {
-            title,
-            model_name: model.name.clone(),
-            model_file: Some(beside(&options.file, &file.model).display().to_string()),
-            log_file: summary
-                .log
-                .as_ref()
-                .map_or_else(String::new, |l| l.display().to_string()),
-            notes: Vec::new(),
-            command: output::command_line(),
-        };
-        save(path, &run_page(&context, &record))?;
-        output::note(&format!("wrote {}", path.display()));
-    }
-    if end.failed {
-        Err(Failure::work(end.text))
-    } else {
-        Ok(())
-    }
-}
-
-/// Puts what the design promises beside what was measured.
-fn promise(file: &LoopFile, record: &mut LoopRecord) {
-    if record.every > 1 {
-        // The design is sampled with the loop's period.
-        return;
-    }
-    let references: Vec<Vec<f64>> = record
-        .controlled
-        .iter()
-        .map(|trace| trace.reference.clone())
-        .collect();
-    if let Some(ideal) = file.controller.ideal(&references, file.period_s) {
-        for (trace, ideal) in record.controlled.iter_mut().zip(ideal) {
-            trace.ideal = Some(ideal);
-        }
-    }
-}
-
-/// Most ticks of one run: beyond it a number was mistyped.
-const MOST_TICKS: f64 = 1e7;
-
-/// A path in a loop file is relative to that file.
-fn beside(file: &Path, path: &str) -> PathBuf {
-    file.parent()
-        .map_or_else(|| PathBuf::from(path), |folder| folder.join(path))
-}
-
-/// The model of a loop file.
-pub(crate) fn model_of(path: &Path, source: &Source, file: &LoopFile) -> Result<Model, Failure> {
-    let model_path = beside(path, &file.model);
-    if !model_path.exists() {
-        let message = format!("there is no model file {}", model_path.display());
-        return Err(source.error(&["model".into()], &message, None).into());
-    }
-    Ok(Model::load(&model_path)?.0)
-}
-
-/// Composes the loop of a loop file.
-pub(crate) fn compose(
-    path: &Path,
-    source: &Source,
-    file: &LoopFile,
-) -> Result<(Model, Composed), Failure> {
-    let ticks = file.duration_s.map_or(0.0, |d| d / file.period_s);
-    if file.period_s > 0.0 && ticks > MOST_TICKS {
-        let message = format!("that is {ticks:.1e} ticks, expected at most {MOST_TICKS:e}");
-        return Err(source.error(&["duration_s".into()], &message, None).into());
-    }
-    let model = model_of(path, source, file)?;
-    let load_model = |name: &str| {
-        Model::load(&beside(path, name))
-            .map(|(model, _)| model)
-            .map_err(|e| BuildError::at("model", e.to_string()))
-    };
-    let load_runs = |name: &str, model: &Model| {
-        let path = beside(path, name);
-        let wrong =
-            |e: &loopsight_recordings::RecordingError| BuildError::at("recording", e.to_string());
-        let log = loopsight_recordings::read(&path).map_err(|e| wrong(&e))?;
-        Ok(load::map(model, &log).map_err(|e| wrong(&e))?.runs)
-    };
-    let context = DriverContext {
-        model: &model,
-        period: file.period_s,
-        load_model: &load_model,
-        load_runs: &load_runs,
-        read_column: &|name, column| load::column(&beside(path, name), column),
-    };
-    let composed = file.compose(source, &model, &context)?;
-    Ok((model, composed))
-}
-
-/// How a run ended.
-struct End {
-    text: String,
-    failed: bool,
-}
-
-/// Runs the loop to its end; the driver has been stopped when this returns.
-fn drive(
-    file: &LoopFile,
-    composed: &mut Composed,
-    recorder: &mut Recorder,
-    mut log: Option<&mut LogWriter>,
-) -> End {
-    let stop = Arc::new(AtomicBool::new(false));
-    let seen = Arc::clone(&stop);
-    // A second handler (another run in the same process) is refused: the first one still stops us.
-    let _ = ctrlc::set_handler(move || seen.store(true, Ordering::SeqCst));
-    let ticks = file.duration_s.map_or(u64::MAX, |d| {
-        (d / file.period_s + 1e-9).floor().min(1e15) as u64
+    let rows = run.tracking.iter().map(|t| {
+        vec![
+            t.id.clone(),
+            with_unit(t.rms_error, &t.unit),
+            with_unit(t.rms_error.map(|_| t.largest_error), &t.unit),
+        ]
     });
-    let mut dashboard = Dashboard::new(file.duration_s, recorder.record.inputs.len());
-    let mut end = End {
-        text: format!(
-            "the run lasted the {} s asked for",
-            output::number(ticks as f64 * file.period_s)
+    let mut text = format!(
+        "{} ticks in {} s: {}\n{}\nsaturated in {} of the ticks",
+        run.ticks,
+        number(run.duration_s),
+        run.end,
+        output::table(
+            &["tracking", "rms error", "largest error"],
+            &rows.collect::<Vec<_>>()
         ),
-        failed: false,
-    };
-    for index in 0..ticks {
-        let time = index as f64 * file.period_s;
-        if stop.load(Ordering::SeqCst) {
-            end.text = format!("stopped by Ctrl-C at {time:.2} s");
-            recorder.happened(time, end.text.clone());
-            break;
-        }
-        let late = match composed.tick(time) {
-            Ok(step) => {
-                recorder.push(&step, file.supervisor.is_some());
-                dashboard.take(&step, recorder);
-                step.late
-            }
-            Err(error) => {
-                end = End {
-                    failed: !error.is_end(),
-                    text: match &error {
-                        TickError::Driver(e) => e.to_string(),
-                        TickError::Control(e) => {
-                            let said = composed.host.controller.remark();
-                            said.map_or_else(|| e.to_string(), str::to_owned)
-                        }
-                        TickError::Supervisor(event) => recorder.words(event),
-                    },
-                };
-                if end.failed {
-                    recorder.happened(time, end.text.clone());
-                }
-                break;
-            }
-        };
-        recorder.learn(composed, late);
-        if let Some(remark) = composed.host.controller.remark() {
-            recorder.happened(time, remark.to_owned());
-        }
-        if let Some(log) = log.as_mut()
-            && let Err(error) = write(log, recorder)
-        {
-            end = End {
-                text: format!("the log cannot be written: {error}"),
-                failed: true,
-            };
-            break;
+        percent(run.saturated_share)
+    );
+    if run.stale_share > 0.0 {
+        let share = percent(run.stale_share);
+        text.push_str(&format!("\nstale samples in {share} of the ticks"));
+    }
+    if run.fallen_back_share > 0.0 {
+        let share = percent(run.fallen_back_share);
+        text.push_str(&format!("\nthe last good model in {share} of the ticks"));
+    }
+    if let Some(t) = &run.timing {
+        text.push_str(&format!(
+            "\nreal time: jitter {:.3} ms (rms), latest {:.3} ms, {} of {} ticks more than a period late, \
+             longest tick {:.3} ms",
+            1e3 * t.jitter_s,
+            1e3 * t.latest_s,
+            t.missed,
+            run.ticks,
+            1e3 * t.longest_s
+        ));
+    }
+    if !run.estimates.is_empty() {
+        text.push_str(&format!("\n\n{}", estimates_text(&run.estimates)));
+    }
+    if !run.innovation.is_empty() {
+        let rows = run.innovation.iter().enumerate().map(|(i, s)| {
+            let excited = run.excitation.get(i);
+            let learned = run.learning.get(i);
+            vec![
+                s.id.clone(),
+                with_unit(s.rms, &s.unit),
+                excited.map_or_else(|| "-".to_owned(), |e| with_unit(e.rms, &e.unit)),
+                learned.map_or_else(|| "-".to_owned(), |l| percent(l.taught_share)),
+            ]
+        });
+        let head = [
+            "regression",
+            "innovation, rms",
+            "excitation, rms",
+            "taught by",
+        ];
+        text.push_str(&format!(
+            "\n\n{}",
+            output::table(&head, &rows.collect::<Vec<_>>())
+        ));
+        for l in run.learning.iter().filter(|l| !l.withheld_share.is_empty()) {
+            let why = l.withheld_share.iter();
+            let why =
+                why.map(|(why, share)| format!("{} {}", why.replace('_', " "), percent(*share)));
+            let why: Vec<String> = why.collect();
+            text.push_str(&format!("\n{} was not taught: {}", l.id, why.join(", ")));
         }
     }
-    let _ = dashboard.clear();
-    if let Err(error) = composed.host.stop() {
-        end = End {
-            text: format!("the robot could not be stopped safely: {error}"),
-            failed: true,
-        };
+    if !run.events.is_empty() {
+        text.push_str(&format!("\n\nevents\n{}", events_text(&run.events)));
     }
-    // The reason why a run ended stands in its log, too.
-    if let Some(log) = log {
-        for (time, what) in recorder.news() {
-            if let Err(error) = log.remark(time, &what) {
-                output::note(&format!("the log lacks its last event: {error}"));
-            }
-        }
+    if !run.notes.is_empty() {
+        text.push('\n');
     }
-    end
+    for note in &run.notes {
+        text.push_str(&format!("\n{note}"));
+    }
+    text
 }
 
-/// Writes the present tick, and what happened at it.
-fn write(log: &mut LogWriter, recorder: &mut Recorder) -> Result<(), RecordingError> {
-    log.write(recorder.row())?;
-    for (time, what) in recorder.news() {
-        log.remark(time, &what)?;
+/// A line for each thing that happened; what happened again and again is told once.
+fn events_text(events: &[Happened]) -> String {
+    let mut told: Vec<(&Happened, usize, f64)> = Vec::new();
+    for event in events {
+        match told
+            .iter_mut()
+            .find(|(first, _, _)| first.what == event.what)
+        {
+            Some((_, times, last)) => {
+                *times += 1;
+                *last = event.time_s;
+            }
+            None => told.push((event, 1, event.time_s)),
+        }
     }
-    Ok(())
+    let mut lines: Vec<String> = told
+        .iter()
+        .take(MOST_TOLD)
+        .map(|(event, times, last)| {
+            let again = match times {
+                1 => String::new(),
+                _ => format!(" ({times} times, the last at {last:.3} s)"),
+            };
+            format!("  {:>9.3} s  {}{again}", event.time_s, event.what)
+        })
+        .collect();
+    if let Some(more) = told.len().checked_sub(MOST_TOLD).filter(|more| *more > 0) {
+        lines.push(format!("  and {more} more, see the log"));
+    }
+    lines.join("\n")
+}
+
+fn estimates_text(estimates: &[LearnedParameter]) -> String {
+    let rows: Vec<Vec<String>> = estimates
+        .iter()
+        .map(|p| {
+            vec![
+                p.name.clone(),
+                number(p.start),
+                number(p.value),
+                p.interval95.map_or_else(
+                    || "-".to_owned(),
+                    |[low, high]| format!("{} … {}", number(low), number(high)),
+                ),
+                p.unit.clone(),
+            ]
+        })
+        .collect();
+    let head = [
+        "identified",
+        "start",
+        "value",
+        "95 % in white noise",
+        "unit",
+    ];
+    output::table(&head, &rows)
 }

@@ -4,10 +4,10 @@
 use std::time::{Duration, Instant};
 
 use console::{Term, measure_text_width, truncate_str};
-use loopsight_core::Step;
 
-use super::recorder::Recorder;
+use crate::RunView;
 use crate::cli::output;
+use crate::words::number;
 
 /// Time between two pictures on a terminal, and between two lines elsewhere.
 const REDRAW: Duration = Duration::from_millis(150);
@@ -22,8 +22,6 @@ const BAR: usize = 17;
 /// Shows a loop at work on standard error.
 pub(super) struct Dashboard {
     term: Term,
-    /// Seconds that were asked for, if any.
-    duration: Option<f64>,
     next: Instant,
     /// Lines drawn by the last picture.
     drawn: usize,
@@ -32,23 +30,25 @@ pub(super) struct Dashboard {
 }
 
 impl Dashboard {
-    pub(super) fn new(duration: Option<f64>, inputs: usize) -> Self {
+    pub(super) fn new() -> Self {
         let term = Term::buffered_stderr();
         let wait = if term.is_term() { REDRAW } else { LINE };
         Self {
             next: Instant::now() + wait,
             term,
-            duration,
             drawn: 0,
-            largest: vec![0.0; inputs],
+            largest: Vec::new(),
         }
     }
 
     /// Takes a tick; draws when it is time to. What cannot be drawn is not drawn: a loop does not stop
     /// because nobody can look at it.
-    pub(super) fn take(&mut self, step: &Step<'_, f64>, recorder: &Recorder) {
-        for (largest, applied) in self.largest.iter_mut().zip(step.applied) {
-            *largest = largest.max(applied.abs());
+    pub(super) fn take(&mut self, view: &RunView<'_>) {
+        for (i, input) in view.inputs().enumerate() {
+            match self.largest.get_mut(i) {
+                Some(largest) => *largest = largest.max(input.applied.abs()),
+                None => self.largest.push(input.applied.abs()),
+            }
         }
         let now = Instant::now();
         if now < self.next {
@@ -56,12 +56,12 @@ impl Dashboard {
         }
         if !self.term.is_term() {
             self.next = now + LINE;
-            output::note(&line(step, recorder));
+            output::note(&line(view));
             return;
         }
         self.next = now + REDRAW;
         let width = usize::from(self.term.size().1).max(20);
-        let lines = self.picture(step, recorder, width);
+        let lines = self.picture(view, width);
         let _ = self.clear();
         for line in &lines {
             let _ = self.term.write_line(line);
@@ -81,54 +81,56 @@ impl Dashboard {
     }
 
     /// The lines of a picture, none wider than `width`.
-    fn picture(&self, step: &Step<'_, f64>, recorder: &Recorder, width: usize) -> Vec<String> {
-        let record = &recorder.record;
-        let ticks = record.ticks().max(1) as f64;
-        let of = self.duration.map_or_else(String::new, |d| {
-            let done = (step.tick.time / d).clamp(0.0, 1.0);
-            format!(" of {} s  {}", output::number(d), bar(done, 20, ('#', '-')))
+    fn picture(&self, view: &RunView<'_>, width: usize) -> Vec<String> {
+        let of = view.duration_s().map_or_else(String::new, |d| {
+            let done = (view.time_s() / d).clamp(0.0, 1.0);
+            format!(" of {} s  {}", number(d), bar(done, 20, ('#', '-')))
         });
-        let mut lines = vec![format!("{:.2} s{of}", step.tick.time)];
+        let mut lines = vec![format!("{:.2} s{of}", view.time_s())];
         let mut said = format!(
             "saturated {:.1} %   stale {:.1} %",
-            100.0 * recorder.saturated as f64 / ticks,
-            100.0 * recorder.stale as f64 / ticks
+            100.0 * view.saturated_share(),
+            100.0 * view.stale_share()
         );
-        if let Some(timing) = &record.timing {
-            said.push_str(&format!("   jitter {:.2} ms", 1e3 * timing.jitter_s));
+        if let Some(jitter) = view.jitter_s() {
+            said.push_str(&format!("   jitter {:.2} ms", 1e3 * jitter));
         }
-        if step.fallen {
+        if view.fallen_back() {
             said.push_str("   LAST GOOD MODEL");
         }
         lines.push(said);
-        for (i, trace) in record.controlled.iter().enumerate() {
-            let rms = recorder.errors[i].rms().unwrap_or(f64::NAN);
+        for signal in view.controlled() {
             lines.push(format!(
                 "{} {:>8} of {:>8} {:<6} rms {:>8}",
-                name(&trace.id),
-                short(step.measured[i]),
-                short(step.reference[i]),
-                trace.unit,
-                short(rms)
+                name(signal.id),
+                short(signal.measured),
+                short(signal.reference),
+                signal.unit,
+                short(signal.rms_error)
             ));
         }
-        for (i, trace) in record.inputs.iter().enumerate() {
-            let share = step.applied[i] / self.largest[i].max(f64::MIN_POSITIVE);
+        for (input, largest) in view.inputs().zip(&self.largest) {
+            let share = input.applied / largest.max(f64::MIN_POSITIVE);
             lines.push(format!(
                 "{} {:>8} {:<6} {}",
-                name(&trace.id),
-                short(step.applied[i]),
-                trace.unit,
+                name(input.id),
+                short(input.applied),
+                input.unit,
                 needle(share)
             ));
         }
-        for (i, p) in record.parameters.iter().take(MOST_PARAMETERS).enumerate() {
-            let value = short(recorder.estimates[i]);
-            let std = Some(recorder.deviations[i]).filter(|s| s.is_finite());
-            let std = std.map_or_else(String::new, |s| format!(" ± {}", short(s)));
-            lines.push(format!("{} {value:>8}{std} {}", name(&p.name), p.unit));
+        for p in view.parameters().take(MOST_PARAMETERS) {
+            let std = p
+                .std
+                .map_or_else(String::new, |s| format!(" ± {}", short(s)));
+            lines.push(format!(
+                "{} {:>8}{std} {}",
+                name(p.name),
+                short(p.value),
+                p.unit
+            ));
         }
-        if let Some((time, what)) = record.events.last() {
+        if let Some((time, what)) = view.last_event() {
             lines.push(format!("{time:.2} s: {what}"));
         }
         // A terminal that is full to the last column starts a new line.
@@ -141,25 +143,25 @@ impl Dashboard {
 }
 
 /// The line for those who are not at a terminal.
-fn line(step: &Step<'_, f64>, recorder: &Recorder) -> String {
-    let mut text = format!("{:.2} s", step.tick.time);
-    for (i, trace) in recorder.record.controlled.iter().enumerate() {
+fn line(view: &RunView<'_>) -> String {
+    let mut text = format!("{:.2} s", view.time_s());
+    for signal in view.controlled() {
         text.push_str(&format!(
             "  {} {} of {} {}",
-            trace.id,
-            short(step.measured[i]),
-            short(step.reference[i]),
-            trace.unit
+            signal.id,
+            short(signal.measured),
+            short(signal.reference),
+            signal.unit
         ));
     }
-    for (i, trace) in recorder.record.inputs.iter().enumerate() {
-        let value = short(step.applied[i]);
-        text.push_str(&format!("  {} {value} {}", trace.id, trace.unit));
+    for input in view.inputs() {
+        let value = short(input.applied);
+        text.push_str(&format!("  {} {value} {}", input.id, input.unit));
     }
-    if step.outcome.saturated {
+    if view.saturated() {
         text.push_str("  saturated");
     }
-    if step.fallen {
+    if view.fallen_back() {
         text.push_str("  last good model");
     }
     text

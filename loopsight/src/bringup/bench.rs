@@ -1,15 +1,13 @@
 //! A robot on the bench: its driver, one command per period, with the model beside it.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use loopsight_core::{Clock, Driver as _, Limits};
 use loopsight_model::model::Model;
 use loopsight_model::registry::HostDriver;
 use loopsight_model::simulate::Simulator;
 
-use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::error::{Error, Result};
+use crate::watch::CancelToken;
+use crate::words::number;
 
 /// No fresh sample for longer is the end, s.
 const STALE: f64 = 0.2;
@@ -41,7 +39,7 @@ pub(super) struct Bench<'m> {
     applied: Vec<f64>,
     /// Magnitudes of the measured signals that no motion here may come to.
     pub(super) most: Vec<f64>,
-    interrupted: Arc<AtomicBool>,
+    cancel: CancelToken,
     stopped: bool,
 }
 
@@ -52,7 +50,7 @@ impl<'m> Bench<'m> {
         clock: Box<dyn Clock>,
         limits: Option<Limits<Vec<f64>>>,
         period: f64,
-        interrupted: Arc<AtomicBool>,
+        cancel: CancelToken,
     ) -> Self {
         let (ny, nu) = (model.measured.len(), model.plant.inputs.len());
         Self {
@@ -66,27 +64,27 @@ impl<'m> Bench<'m> {
             measured: vec![0.0; ny],
             applied: vec![0.0; nu],
             most: vec![f64::INFINITY; ny],
-            interrupted,
+            cancel,
             stopped: false,
         }
     }
 
     /// Stops the robot; the reason it is stopped for, if any, comes back with what else went wrong.
-    fn fail(&mut self, why: String) -> Failure {
+    fn fail(&mut self, why: String) -> Error {
         let stopped = self.driver.safe_stop();
         self.stopped = true;
-        Failure::work(match stopped {
+        Error::work(match stopped {
             Ok(()) => format!("{why}; the robot was stopped"),
             Err(error) => format!("{why}, and the robot could not be stopped safely: {error}"),
         })
     }
 
     /// Stops the robot, for good.
-    pub(super) fn stop(&mut self) -> Result<(), Failure> {
+    pub(super) fn stop(&mut self) -> Result<()> {
         self.stopped = true;
         self.driver
             .safe_stop()
-            .map_err(|e| Failure::work(format!("the robot could not be stopped safely: {e}")))
+            .map_err(|e| Error::work(format!("the robot could not be stopped safely: {e}")))
     }
 
     /// Waits for the next period. Ticks that were missed are not made up for: a person took that time.
@@ -99,9 +97,9 @@ impl<'m> Bench<'m> {
     }
 
     /// Waits for the next period and reads; looks whether the robot may go on.
-    fn read(&mut self) -> Result<(), Failure> {
+    fn read(&mut self) -> Result<()> {
         self.wait();
-        if self.interrupted.load(Ordering::SeqCst) {
+        if self.cancel.is_cancelled() {
             return Err(self.fail("stopped by Ctrl-C".to_owned()));
         }
         let sample = match self.driver.read(&mut self.measured) {
@@ -115,7 +113,7 @@ impl<'m> Bench<'m> {
         };
         // Half a period for the rounding of the sum.
         if self.stale_s > STALE + 0.5 * self.period {
-            return Err(self.fail(format!("no fresh sample for {} s", output::number(STALE))));
+            return Err(self.fail(format!("no fresh sample for {} s", number(STALE))));
         }
         for (i, m) in self.model.measured.iter().enumerate() {
             let (y, most) = (self.measured[i], self.most[i]);
@@ -124,9 +122,9 @@ impl<'m> Bench<'m> {
                 let why = format!(
                     "{} is {} {}, more than the {} that no motion here should come to",
                     m.signal.id,
-                    output::number(y),
+                    number(y),
                     m.signal.unit,
-                    output::number(most)
+                    number(most)
                 );
                 return Err(self.fail(why));
             }
@@ -134,7 +132,7 @@ impl<'m> Bench<'m> {
         Ok(())
     }
 
-    fn write(&mut self, command: &mut [f64]) -> Result<(), Failure> {
+    fn write(&mut self, command: &mut [f64]) -> Result<()> {
         if let Some(limits) = &mut self.limits {
             limits.clamp(self.period, command);
         }
@@ -145,7 +143,7 @@ impl<'m> Bench<'m> {
     }
 
     /// One period at 0.
-    pub(super) fn rest(&mut self) -> Result<(), Failure> {
+    pub(super) fn rest(&mut self) -> Result<()> {
         self.read()?;
         self.write(&mut vec![0.0; self.applied.len()])
     }
@@ -155,7 +153,7 @@ impl<'m> Bench<'m> {
         &mut self,
         duration: f64,
         command: impl Fn(f64) -> Option<Vec<f64>>,
-    ) -> Result<Motion, Failure> {
+    ) -> Result<Motion> {
         let (ny, nu) = (self.measured.len(), self.applied.len());
         let mut simulator = Simulator::<f64>::new(self.model, &self.model.values());
         let mut predicted = vec![0.0; ny];
@@ -224,7 +222,7 @@ impl Drop for Bench<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Mutex;
+    use std::sync::{Arc, Mutex};
 
     use loopsight_core::{Driver, DriverFault, Sample};
     use loopsight_model::registry::HostDriverError;
@@ -291,9 +289,9 @@ mod tests {
             fails: false,
         };
         spoil(&mut driver);
-        let interrupted = Arc::default();
+        let cancel = CancelToken::new();
         let clock = Box::new(seen.clone());
-        Bench::new(model, Box::new(driver), clock, None, 0.01, interrupted)
+        Bench::new(model, Box::new(driver), clock, None, 0.01, cancel)
     }
 
     #[test]
@@ -322,7 +320,9 @@ mod tests {
             let seen = Seen::default();
             let mut bench = bench(&model, &seen, spoil);
             bench.most.fill(most);
-            bench.interrupted.store(interrupted, Ordering::SeqCst);
+            if interrupted {
+                bench.cancel.cancel();
+            }
             let failed = bench.drive(1.0, |_| Some(vec![0.0])).is_err();
             drop(bench);
             let asked = seen.0.lock().unwrap().0.clone();

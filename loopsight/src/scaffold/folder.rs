@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::error::{Error, Result};
 
 /// Files on their way into a new folder: they lie in a temporary one beside it until
 /// [`Folder::finish`].
@@ -18,10 +17,10 @@ pub(super) struct Folder {
 
 impl Folder {
     /// Begins the folder `target`, which must not exist.
-    pub(super) fn new(target: &Path) -> Result<Self, Failure> {
+    pub(super) fn new(target: &Path) -> Result<Self> {
         let refuse = |why: &str| {
             let shown = target.display();
-            Failure::request(format!("cannot make the folder `{shown}`: {why}"))
+            Error::request(format!("cannot make the folder `{shown}`: {why}"))
         };
         if target.symlink_metadata().is_ok() {
             return Err(refuse(
@@ -67,7 +66,7 @@ impl Folder {
     }
 
     /// Writes a file of the new folder.
-    pub(super) fn write(&mut self, name: &str, text: &str) -> Result<PathBuf, Failure> {
+    pub(super) fn write(&mut self, name: &str, text: &str) -> Result<PathBuf> {
         let path = self.inside().join(name);
         let made = match path.parent() {
             Some(parent) => std::fs::create_dir_all(parent),
@@ -76,22 +75,20 @@ impl Folder {
         made.and_then(|()| std::fs::write(&path, text))
             .map_err(|e| {
                 let shown = self.target.join(name);
-                Failure::request(format!("cannot write `{}`: {e}", shown.display()))
+                Error::request(format!("cannot write `{}`: {e}", shown.display()))
             })?;
         self.written.push(name.to_owned());
         Ok(path)
     }
 
-    /// Puts the folder in its place.
-    pub(super) fn finish(self) -> Result<(), Failure> {
+    /// Puts the folder in its place; the files that lie in it.
+    pub(super) fn finish(self) -> Result<Vec<PathBuf>> {
         std::fs::rename(self.inside(), &self.target).map_err(|e| {
             let shown = self.target.display();
-            Failure::request(format!("cannot make the folder `{shown}`: {e}"))
+            Error::request(format!("cannot make the folder `{shown}`: {e}"))
         })?;
-        for name in &self.written {
-            output::note(&format!("wrote {}", self.target.join(name).display()));
-        }
-        Ok(())
+        let names = self.written.iter();
+        Ok(names.map(|name| self.target.join(name)).collect())
     }
 }
 

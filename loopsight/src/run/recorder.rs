@@ -11,7 +11,7 @@ use loopsight_recordings::{column, header};
 use loopsight_report::{ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace};
 
 use super::timing::Stopwatch;
-use crate::cli::commands::simulate::rounded;
+use crate::columns::rounded;
 
 /// Most ticks that are kept for the page; beyond it every second one is left out, again and again.
 const MOST_KEPT: usize = 200_000;
@@ -21,11 +21,11 @@ const MOST_ALIKE: usize = 200;
 
 /// Sums over all ticks, also those that are not kept.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Sums {
+pub(crate) struct Sums {
     squares: f64,
     n: u64,
-    pub(super) largest: f64,
-    pub(super) last: f64,
+    pub(crate) largest: f64,
+    pub(crate) last: f64,
 }
 
 impl Sums {
@@ -39,28 +39,28 @@ impl Sums {
     }
 
     /// Root mean square; `None` of nothing.
-    pub(super) fn rms(&self) -> Option<f64> {
+    pub(crate) fn rms(&self) -> Option<f64> {
         (self.n > 0).then(|| (self.squares / self.n as f64).sqrt())
     }
 }
 
 /// Collects what a loop does.
-pub(super) struct Recorder {
-    pub(super) record: LoopRecord,
+pub(crate) struct Recorder {
+    pub(crate) record: LoopRecord,
     /// Tracking error of each controlled signal, and innovation of each regression.
-    pub(super) errors: Vec<Sums>,
-    pub(super) innovations: Vec<Sums>,
-    pub(super) excitations: Vec<Sums>,
+    pub(crate) errors: Vec<Sums>,
+    pub(crate) innovations: Vec<Sums>,
+    pub(crate) excitations: Vec<Sums>,
     /// Of each parameter, its value in the model file, its estimate, and the deviation of that.
-    pub(super) starts: Vec<f64>,
-    pub(super) estimates: Vec<f64>,
-    pub(super) deviations: Vec<f64>,
+    pub(crate) starts: Vec<f64>,
+    pub(crate) estimates: Vec<f64>,
+    pub(crate) deviations: Vec<f64>,
     /// Ticks that taught each regression nothing, by reason.
-    pub(super) withheld: Vec<BTreeMap<&'static str, usize>>,
+    pub(crate) withheld: Vec<BTreeMap<&'static str, usize>>,
     /// Ticks with a flag.
-    pub(super) saturated: usize,
-    pub(super) stale: usize,
-    pub(super) fallen: usize,
+    pub(crate) saturated: usize,
+    pub(crate) stale: usize,
+    pub(crate) fallen: usize,
     row: Vec<f64>,
     signals: Vec<Signal>,
     turning: Vec<String>,
@@ -82,7 +82,7 @@ fn rate(unit: &str) -> String {
 }
 
 impl Recorder {
-    pub(super) fn new(model: &Model, composed: &Composed, period_s: f64, real_time: bool) -> Self {
+    pub(crate) fn new(model: &Model, composed: &Composed, period_s: f64, real_time: bool) -> Self {
         let controlled = composed
             .controlled
             .iter()
@@ -170,7 +170,7 @@ impl Recorder {
     }
 
     /// The columns of the log.
-    pub(super) fn headers(&self, model: &Model, composed: &Composed) -> Vec<String> {
+    pub(crate) fn headers(&self, model: &Model, composed: &Composed) -> Vec<String> {
         let mut headers = vec!["time_s".to_owned()];
         headers.extend(model.plant.inputs.iter().map(header));
         headers.extend(model.measured.iter().map(|m| header(m.signal)));
@@ -199,7 +199,7 @@ impl Recorder {
     }
 
     /// Takes a tick.
-    pub(super) fn push(&mut self, step: &Step<'_, f64>, supervised: bool) {
+    pub(crate) fn push(&mut self, step: &Step<'_, f64>, supervised: bool) {
         let (time, outcome) = (step.tick.time, step.outcome);
         if let Some(event) = &step.event {
             self.happened(time, self.words(event));
@@ -269,7 +269,7 @@ impl Recorder {
     }
 
     /// Takes what the tick taught; completes the row of the log.
-    pub(super) fn learn(&mut self, composed: &Composed, step_late: f64) {
+    pub(crate) fn learn(&mut self, composed: &Composed, step_late: f64) {
         let keeps = self.keeps();
         if let Some(identification) = &composed.host.observer {
             let mut next = 0;
@@ -330,23 +330,23 @@ impl Recorder {
     }
 
     /// The present row of the log.
-    pub(super) fn row(&self) -> &[f64] {
+    pub(crate) fn row(&self) -> &[f64] {
         &self.row
     }
 
     /// What a supervisor did, in words.
-    pub(super) fn words(&self, event: &Event<f64>) -> String {
+    pub(crate) fn words(&self, event: &Event<f64>) -> String {
         let signals = self.signals.iter().map(|s| (s.id, s.unit));
         described(event, &signals.collect::<Vec<_>>(), &self.turning)
     }
 
-    pub(super) fn happened(&mut self, time: f64, text: String) {
+    pub(crate) fn happened(&mut self, time: f64, text: String) {
         self.fresh.push((time, text.clone()));
         self.record.events.push((time, text));
     }
 
     /// Events since the last call.
-    pub(super) fn news(&mut self) -> Vec<(f64, String)> {
+    pub(crate) fn news(&mut self) -> Vec<(f64, String)> {
         std::mem::take(&mut self.fresh)
     }
 }

@@ -4,34 +4,25 @@ use std::path::{Path, PathBuf};
 
 use loopsight_model::config::read_text;
 
+use super::Made;
 use super::folder::Folder;
-use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::error::{Error, Result};
 
 /// Files of `examples/custom-plant`, which is built and tested as it stands: what is handed out
 /// here is what is known to work.
 const FILES: [(&str, &str); 6] = [
     (
         "src/ship_heading.rs",
-        include_str!("../../../../template/ship_heading.rs"),
+        include_str!("../../template/ship_heading.rs"),
     ),
     (
         "src/norrbin_damping.rs",
-        include_str!("../../../../template/norrbin_damping.rs"),
+        include_str!("../../template/norrbin_damping.rs"),
     ),
-    (
-        "model.toml",
-        include_str!("../../../../template/model.toml"),
-    ),
-    ("ship.toml", include_str!("../../../../template/ship.toml")),
-    (
-        "zigzag.toml",
-        include_str!("../../../../template/zigzag.toml"),
-    ),
-    (
-        "turns.toml",
-        include_str!("../../../../template/turns.toml"),
-    ),
+    ("model.toml", include_str!("../../template/model.toml")),
+    ("ship.toml", include_str!("../../template/ship.toml")),
+    ("zigzag.toml", include_str!("../../template/zigzag.toml")),
+    ("turns.toml", include_str!("../../template/turns.toml")),
 ];
 
 const MAIN: &str = r"//! The command `loopsight` with a plant and an effect of our own in it.
@@ -59,7 +50,9 @@ const COMMANDS: [&str; 3] = [
 /// The checkout that this command was built from.
 const BUILT_FROM: &str = env!("CARGO_MANIFEST_DIR");
 
-pub(super) fn write(target: &Path, loopsight: Option<&Path>) -> Result<(), Failure> {
+/// Makes the folder `target` for a crate that is built with the checkout `loopsight`, or else with the
+/// one that this program came from.
+pub(crate) fn workshop(target: &Path, loopsight: Option<&Path>) -> Result<Made> {
     let mut folder = Folder::new(target)?;
     check_name(folder.name())?;
     let checkout = checkout(loopsight)?;
@@ -74,17 +67,14 @@ pub(super) fn write(target: &Path, loopsight: Option<&Path>) -> Result<(), Failu
     let text = readme(folder.name());
     folder.write("README.md", &text)?;
     folder.write(".gitignore", "/target\n")?;
-    folder.finish()?;
-    output::note(&format!(
-        "loopsight is taken from {}; `--loopsight PATH` names another checkout",
-        checkout.display()
-    ));
-    output::result(&format!(
-        "next:\n  cd {}\n  {}",
-        target.display(),
-        COMMANDS.join("\n  ")
-    ));
-    Ok(())
+    Ok(Made {
+        written: folder.finish()?,
+        note: Some(format!(
+            "loopsight is taken from {}; `--loopsight PATH` names another checkout",
+            checkout.display()
+        )),
+        next: COMMANDS.map(str::to_owned).to_vec(),
+    })
 }
 
 /// Names that cargo or Rust keeps for itself; keywords are refused by cargo with a message of its
@@ -101,7 +91,7 @@ const RESERVED: [&str; 9] = [
     "loopsight",
 ];
 
-fn check_name(name: &str) -> Result<(), Failure> {
+fn check_name(name: &str) -> Result<()> {
     let mut letters = name.chars();
     let first = letters.next().is_some_and(|c| c.is_ascii_alphabetic());
     let rest = letters.all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
@@ -124,14 +114,14 @@ fn check_name(name: &str) -> Result<(), Failure> {
     } else {
         format!("my-{cleaned}")
     };
-    Err(Failure::request(format!(
+    Err(Error::request(format!(
         "`{name}` cannot be the name of a crate, expected a letter and then letters, digits, - or _; \
          `{near}` would do"
     )))
 }
 
 /// The checkout to build with: the one that was named, or the one this command came from.
-fn checkout(named: Option<&Path>) -> Result<PathBuf, Failure> {
+fn checkout(named: Option<&Path>) -> Result<PathBuf> {
     let path = match named {
         Some(path) => path.to_owned(),
         None => Path::new(BUILT_FROM).join(".."),
@@ -149,7 +139,7 @@ fn checkout(named: Option<&Path>) -> Result<PathBuf, Failure> {
         Some(file) => Err(format!("there is no {}", path.join(file).display())),
     };
     found.map_err(|why| {
-        Failure::request(if named.is_some() {
+        Error::request(if named.is_some() {
             format!("{} is no checkout of loopsight: {why}", path.display())
         } else {
             format!(

@@ -3,25 +3,25 @@
 use std::path::Path;
 
 use loopsight_core::{PlantMeta, Signal};
-use loopsight_model::config::{Source, nearest};
-use loopsight_model::loop_file::LoopFile;
+use loopsight_model::config::nearest;
 use loopsight_model::model::Model;
 use loopsight_model::registry;
 use loopsight_model::run::Run;
 
+use super::Made;
 use super::folder::Folder;
 use super::model_text::model_text;
 use super::pace::{Pace, rounded_down};
 use super::texts::{DRIVE, commands, experiment_text, loop_text, readme_text};
-use crate::cli::commands::run::compose;
-use crate::cli::commands::simulate::Experiment;
-use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::error::{Error, Result};
+use crate::run::Loop;
+use crate::simulate::Experiment;
 
 /// Noise of a sensor over what its signal does while the inputs are held once.
 const NOISE: f64 = 0.01;
 
-pub(super) fn write(target: &Path, plant: &str) -> Result<(), Failure> {
+/// Makes the folder `target` for a robot of this plant.
+pub(crate) fn robot(target: &Path, plant: &str) -> Result<Made> {
     let meta = find(plant)?;
     let mut folder = Folder::new(target)?;
     let (model, measured) = example(meta)?;
@@ -45,16 +45,14 @@ pub(super) fn write(target: &Path, plant: &str) -> Result<(), Failure> {
     let looped = with_loop(&mut folder, meta, &trial, pace)?;
     let text = readme_text(folder.name(), meta, looped);
     folder.write("README.md", &text)?;
-    folder.finish()?;
-    output::result(&format!(
-        "next:\n  cd {}\n  {}",
-        target.display(),
-        commands().join("\n  ")
-    ));
-    Ok(())
+    Ok(Made {
+        written: folder.finish()?,
+        note: None,
+        next: commands().to_vec(),
+    })
 }
 
-fn find(id: &str) -> Result<&'static PlantMeta, Failure> {
+fn find(id: &str) -> Result<&'static PlantMeta> {
     let plants = registry::plants();
     if let Some(meta) = plants.iter().find(|m| m.id == id) {
         return Ok(meta);
@@ -66,16 +64,16 @@ fn find(id: &str) -> Result<&'static PlantMeta, Failure> {
     }
     message.push_str(&format!(" Known are {}.", ids.join(", ")));
     message.push_str(" A plant of your own: `loopsight new FOLDER --rust`");
-    Err(Failure::request(message))
+    Err(Error::request(message))
 }
 
 /// The plant with the values of its own example, and what is measured on it: what a velocity
 /// controller acts on, or else all states.
-fn example(meta: &'static PlantMeta) -> Result<(Model, Vec<&'static Signal>), Failure> {
+fn example(meta: &'static PlantMeta) -> Result<(Model, Vec<&'static Signal>)> {
     let (model, _) = Model::from_toml(&format!("the example of `{}`", meta.id), meta.example)?;
     let missing = model.missing_values();
     if !missing.is_empty() {
-        return Err(Failure::work(format!(
+        return Err(Error::work(format!(
             "the example of the plant `{}` gives no value for {}: without them nothing can run",
             meta.id,
             missing.join(", ")
@@ -89,10 +87,9 @@ fn example(meta: &'static PlantMeta) -> Result<(Model, Vec<&'static Signal>), Fa
     Ok((model, measured))
 }
 
-fn simulate(model: &Model, text: &str, meta: &PlantMeta) -> Result<Run, Failure> {
+fn simulate(model: &Model, text: &str, meta: &PlantMeta) -> Result<Run> {
     let file = format!("the experiment for `{}`", meta.id);
-    let source = Source::parse(&file, text)?;
-    Ok(Experiment::parse(&source)?.simulate(&source, model)?)
+    Experiment::from_toml(&file, text)?.simulate(model)
 }
 
 /// What each measured signal does while the inputs are held once: the rms of its change over that
@@ -114,19 +111,12 @@ fn deviations(run: &Run, pace: Pace) -> Vec<f64> {
 
 /// Writes the first loop that can be composed: one that learns, or one that does not. A plant
 /// without controlled states has none.
-fn with_loop(
-    folder: &mut Folder,
-    meta: &PlantMeta,
-    trial: &Run,
-    pace: Pace,
-) -> Result<bool, Failure> {
+fn with_loop(folder: &mut Folder, meta: &PlantMeta, trial: &Run, pace: Pace) -> Result<bool> {
     for learns in [true, false] {
         let text = loop_text(folder.name(), meta, &deviations(trial, pace), pace, learns);
         let path = folder.inside().join("loop.toml");
-        let source = Source::parse(&path.display().to_string(), &text)?;
-        let composed = LoopFile::parse(&source)
-            .map_err(Failure::from)
-            .and_then(|file| compose(&path, &source, &file));
+        let control = Loop::from_toml(&path.display().to_string(), &text);
+        let composed = control.and_then(|c| c.compose(&c.model()?.composed).map(drop));
         if composed.is_ok() {
             folder.write("loop.toml", &text)?;
             return Ok(true);

@@ -1,0 +1,110 @@
+//! What [`Session::fit`](crate::Session::fit) answers.
+
+use loopsight_diagnosis::Fit;
+use serde::Serialize;
+
+use super::Answer;
+use super::common::{Estimates, ModelErrors, estimates};
+use super::series::{Series, SeriesOf, series};
+use crate::about::About;
+use crate::fit::Method;
+use crate::model::Model;
+use crate::words;
+
+/// The parameters of a model, found from a log.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub struct FitAnswer {
+    /// `loopsight/fit/1`.
+    #[cfg_attr(feature = "schema", schemars(extend("const" = "loopsight/fit/1")))]
+    pub schema: &'static str,
+    /// The errors of the fitted model, on the test log where there is one.
+    #[serde(flatten)]
+    pub errors: ModelErrors,
+    /// The parameters by name.
+    pub parameters: Estimates,
+    /// What follows from the plant's parameters, by name; absent where nothing does.
+    #[serde(skip_serializing_if = "Estimates::is_empty")]
+    pub derived: Estimates,
+    /// How they were found.
+    pub method: Method,
+    /// Free-run error before the fit; `null` where the file gave no values.
+    pub nrmse_before: Option<f64>,
+    /// Free-run error on the log it was fitted to.
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
+    pub nrmse_fit: f64,
+    /// Iterations (output error) or samples (recursive least squares).
+    pub iterations: u64,
+    /// Combinations of parameters that the data do not determine, in words.
+    pub flat: Vec<String>,
+    /// The fit was cancelled: these are the best values found until then, without errors.
+    pub cancelled: bool,
+    /// What it comes to, in a few sentences.
+    pub summary: String,
+    /// Sample by sample; present where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub series: Option<Vec<Series>>,
+    #[serde(skip)]
+    #[cfg_attr(feature = "schema", schemars(skip))]
+    pub(crate) about: About,
+    #[serde(skip)]
+    #[cfg_attr(feature = "schema", schemars(skip))]
+    pub(crate) engine: Fit,
+    #[serde(skip)]
+    #[cfg_attr(feature = "schema", schemars(skip))]
+    model: Model,
+}
+
+impl Answer for FitAnswer {
+    const SCHEMA: &'static str = "loopsight/fit/1";
+}
+
+impl FitAnswer {
+    pub(crate) fn new(engine: Fit, model: Model, about: About, with_series: bool) -> Self {
+        Self {
+            schema: Self::SCHEMA,
+            errors: ModelErrors::from(&engine.comparison),
+            parameters: estimates(&engine.parameters),
+            derived: estimates(&engine.derived),
+            method: engine.method.into(),
+            nrmse_before: engine.nrmse_before,
+            nrmse_fit: engine.nrmse_fit,
+            iterations: engine.iterations,
+            flat: engine.flat.clone(),
+            cancelled: engine.cancelled,
+            summary: words::fit(&engine),
+            series: with_series.then(|| series(SeriesOf::Fitted, &engine.comparison)),
+            about,
+            engine,
+            model,
+        }
+    }
+
+    /// The fitted model: the text it was made from with its comments, the values replaced. Digits far
+    /// below a value's standard error are left out.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// What the errors come to, in a sentence.
+    pub fn judged(&self) -> String {
+        words::comparison(&self.engine.comparison)
+    }
+
+    /// A page with pictures (HTML) that opens offline; `command` stands at its foot and may be empty.
+    pub fn page(&self, command: &str) -> String {
+        let about = &self.about;
+        let mut context = about.context(
+            format!("{} fitted to {}", about.model_name, about.log),
+            command,
+        );
+        if let Some(test) = &about.test {
+            context.notes.push(format!(
+                "Pictures and errors are those on {test}, which the model was not fitted to."
+            ));
+            context.log_file.clone_from(test);
+        }
+        loopsight_report::fit_page(&context, &self.engine)
+    }
+}

@@ -1,0 +1,159 @@
+//! The words of the answers: enums that say in JSON what the engine says in types.
+
+/// An enum of the answers with the variants of one of the engine: a variant that is new there does not
+/// compile here, so that the schema never lags behind.
+macro_rules! mirror {
+    (
+        $(#[$meta:meta])*
+        $name:ident of $engine:ty { $($(#[$doc:meta])* $variant:ident,)* }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+        #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+        #[serde(rename_all = "snake_case")]
+        #[non_exhaustive]
+        pub enum $name {
+            $($(#[$doc])* $variant,)*
+        }
+
+        impl From<$engine> for $name {
+            fn from(engine: $engine) -> Self {
+                match engine {
+                    $(<$engine>::$variant => Self::$variant,)*
+                }
+            }
+        }
+
+        impl From<$name> for $engine {
+            fn from(answer: $name) -> Self {
+                match answer {
+                    $($name::$variant => <$engine>::$variant,)*
+                }
+            }
+        }
+    };
+}
+
+mirror! {
+    /// What a diagnosis concludes.
+    Verdict of loopsight_diagnosis::Conclusion {
+        /// An effect of the library explains what the model does not.
+        EffectMissing,
+        /// The model explains the measurements as far as their noise lets tell.
+        NothingMissing,
+        /// Something is missing, and nothing in the library is it.
+        UnknownEffect,
+        /// The recording cannot carry the model.
+        DataInsufficient,
+        /// The recording is at fault.
+        LogFaulty,
+        /// The work was cancelled: what was found until then is there, and nothing is concluded from it.
+        Cancelled,
+    }
+}
+
+mirror! {
+    /// What the data say of a parameter.
+    ParameterVerdict of loopsight_diagnosis::Verdict {
+        /// Pinned by the data.
+        Good,
+        /// Not estimated: it keeps the value of the file.
+        Held,
+        /// Without influence on what is measured in this recording.
+        Dead,
+        /// Only a combination with other parameters is determined.
+        Flat,
+        /// The interval is wider than the value.
+        NotPinned,
+        /// Rests on the end of its admissible range.
+        AtBound,
+        /// The fit was cancelled before it could say.
+        Unfinished,
+    }
+}
+
+mirror! {
+    /// Why a model cannot be simulated from the inputs alone.
+    Because of loopsight_diagnosis::Because {
+        /// Errors of the state grow exponentially.
+        Unstable,
+        /// Errors of the state add up over time.
+        Integrating,
+    }
+}
+
+mirror! {
+    /// What an experiment promises.
+    Promise of loopsight_diagnosis::Promise {
+        /// It answers the question.
+        Answers,
+        /// It would have to be longer.
+        TooShort,
+        /// No inputs answer the question.
+        CannotBeSeparated,
+    }
+}
+
+mirror! {
+    /// Kinds of faults a log can have.
+    FaultKind of loopsight_recordings::FaultKind {
+        /// Time stamps that go backwards; the rows were left out.
+        NonMonotoneTime,
+        /// Rows with the time stamp of the row before; they were left out.
+        DuplicateTime,
+        /// A hole in the time stamps; the run was split there.
+        Gap,
+        /// Time stamps far from equidistant.
+        IrregularTime,
+        /// Missing samples.
+        NotANumber,
+        /// Samples of a magnitude that cannot be; they count as missing.
+        AbsurdValue,
+        /// A sensor that never moves although it should.
+        DeadSensor,
+        /// A sensor that stands still in part of the log, or in all of it with some excuse.
+        ConstantSensor,
+        /// An input that never changes.
+        ConstantInput,
+        /// Nothing moves.
+        Motionless,
+        /// A signal with the wrong sign.
+        ReversedSign,
+        /// A rate that is not the derivative of its angle, by the factor between degrees and radians.
+        GyroScale,
+        /// A run too short to learn from.
+        ShortRun,
+        /// A run without rows.
+        EmptyRun,
+        /// Voltages logged as magnitudes; their signs were reconstructed.
+        UnsignedVoltage,
+        /// A column that does not say its unit; SI was assumed.
+        UnitAssumed,
+    }
+}
+
+mirror! {
+    /// How much a fault matters to a fit.
+    Severity of loopsight_recordings::Severity {
+        /// Good to know.
+        Note,
+        /// A part of the log is lost or doubtful; the rest can be used.
+        Warning,
+        /// A fit to this log would mean nothing.
+        Fatal,
+    }
+}
+
+impl ParameterVerdict {
+    /// In words.
+    pub fn text(self) -> &'static str {
+        loopsight_diagnosis::Verdict::from(self).text()
+    }
+}
+
+impl FaultKind {
+    /// Name as in JSON.
+    pub fn name(self) -> &'static str {
+        loopsight_recordings::FaultKind::from(self).name()
+    }
+}

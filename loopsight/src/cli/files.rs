@@ -1,0 +1,46 @@
+//! Files that the commands read and write.
+
+use std::path::{Path, PathBuf};
+
+use super::output;
+use crate::error::{Error, Result};
+use crate::{Log, Model, Session, files};
+
+pub(crate) use crate::files::writable;
+
+/// `[MODEL] LOG`, with further logs and one to judge on.
+pub(crate) fn session(names: &[PathBuf], also: &[PathBuf], test: Option<&Path>) -> Result<Session> {
+    let mut session = match names {
+        [model, log] => {
+            let model = Model::from_file(model)?;
+            Session::new(model, Log::read(log)?)?
+        }
+        [log] if log.extension().is_some_and(|e| e == "toml") => {
+            return Err(Error::request(format!(
+                "{} is a model file; a log is missing: expected MODEL LOG",
+                log.display()
+            )));
+        }
+        [log] => Session::of_log(Log::read(log)?)?,
+        _ => return Err(Error::request("expected a model file and a log")),
+    };
+    for log in also {
+        session = session.also(Log::read(log)?)?;
+    }
+    if let Some(log) = test {
+        session = session.test(Log::read(log)?)?;
+    }
+    Ok(session)
+}
+
+/// Writes a text file, and says so.
+pub(crate) fn save(path: &Path, text: &str) -> Result<()> {
+    files::save(path, text)?;
+    wrote(path);
+    Ok(())
+}
+
+/// Says that a file was written.
+pub(crate) fn wrote(path: &Path) {
+    output::note(&format!("wrote {}", path.display()));
+}

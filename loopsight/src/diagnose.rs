@@ -1,0 +1,52 @@
+//! Which physical effect a model lacks.
+
+use loopsight_diagnosis::diagnose;
+
+use crate::answers::DiagnoseAnswer;
+use crate::error::Result;
+use crate::session::Session;
+use crate::watch::{Watch, watched};
+
+/// How a model is diagnosed.
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub struct DiagnoseOptions {
+    /// Whether the answer has the series of numbers, sample by sample; by default it has not.
+    pub series: bool,
+    /// Who is told how far the work is, and what stops it.
+    pub watch: Watch,
+}
+
+watched!(DiagnoseOptions);
+
+impl DiagnoseOptions {
+    /// Whether the answer has the series of numbers, sample by sample.
+    #[must_use]
+    pub fn series(mut self, series: bool) -> Self {
+        self.series = series;
+        self
+    }
+}
+
+impl Session {
+    /// Adds every effect of the library to the model at every place it fits, refits all parameters each
+    /// time, and judges by the free run on data that the fits did not see: on the test log, where there is
+    /// one, or else on parts of the log.
+    ///
+    /// A log that is faulty or too short for the model is a verdict, not an error.
+    ///
+    /// # Errors
+    ///
+    /// The model cannot be fitted at all.
+    pub fn diagnose(&self, options: &DiagnoseOptions) -> Result<DiagnoseAnswer> {
+        let data = self.data()?;
+        let work = options.watch.work();
+        let engine = diagnose(&data.model, &data.measurements(), &work)?;
+        Ok(DiagnoseAnswer::new(
+            engine,
+            self.about(data),
+            data.shown(),
+            options.series,
+        ))
+    }
+}

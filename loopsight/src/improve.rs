@@ -1,0 +1,115 @@
+//! Diagnose, add, refit, until nothing more is missing.
+
+use loopsight_diagnosis::improve;
+use loopsight_model::config::{Source, Step};
+use loopsight_model::model::{Attached, Model as Composed, ModelParameter};
+
+use crate::answers::ImproveAnswer;
+use crate::error::Result;
+use crate::model::Model;
+use crate::session::Session;
+use crate::watch::{Watch, watched};
+
+/// How a model is improved.
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub struct ImproveOptions {
+    /// Whether the answer has the series of numbers, sample by sample; by default it has not.
+    pub series: bool,
+    /// Who is told how far the work is, and what stops it.
+    pub watch: Watch,
+}
+
+watched!(ImproveOptions);
+
+impl ImproveOptions {
+    /// Whether the answer has the series of numbers, sample by sample.
+    #[must_use]
+    pub fn series(mut self, series: bool) -> Self {
+        self.series = series;
+        self
+    }
+}
+
+impl Session {
+    /// Repeats [`diagnose`](Session::diagnose), adds what is missing and refits, until nothing more is
+    /// missing. The answer has the model that came of it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Session::diagnose`].
+    pub fn improve(&self, options: &ImproveOptions) -> Result<ImproveAnswer> {
+        let data = self.data()?;
+        let work = options.watch.work();
+        let engine = improve(&data.model, &data.measurements(), &work)?;
+        let model = match &engine.best {
+            Some(best) => {
+                let text = improved_text(&self.model.source()?, &data.model, &best.model);
+                Some(Model::from_toml(&self.model.file, &text)?)
+            }
+            None => None,
+        };
+        Ok(ImproveAnswer::new(
+            engine,
+            model,
+            self.about(data),
+            data.shown(),
+            options.series,
+        ))
+    }
+}
+
+/// The text of a model with the effects of `best` and all fitted values; what it has not is taken out.
+fn improved_text(source: &Source, before: &Composed, best: &Composed) -> String {
+    let is = |a: &Attached, b: &Attached| {
+        a.meta.id == b.meta.id && a.at.iter().map(|c| c.id).eq(b.at.iter().map(|c| c.id))
+    };
+    let mut text = source.text.clone();
+    let mut edit = |change: &dyn Fn(&Source) -> String| {
+        if let Ok(present) = Source::parse(&source.file, &text) {
+            text = change(&present);
+        }
+    };
+    for (index, effect) in before.effects.iter().enumerate().rev() {
+        if !best.effects.iter().any(|e| is(e, effect)) {
+            edit(&|present| present.without_effect(index));
+        }
+    }
+    for effect in &best.effects {
+        if before.effects.iter().any(|e| is(e, effect)) {
+            continue;
+        }
+        let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
+        let own = best.parameters.iter().skip(effect.first_parameter);
+        let parameters: Vec<(&str, f64)> = own
+            .zip(effect.meta.parameters)
+            .filter_map(|(parameter, declaration)| Some((declaration.id, parameter.value?)))
+            .collect();
+        edit(&|present| present.with_effect(effect.meta.id, &at, &parameters));
+    }
+    // Where they stand now.
+    let Ok((model, present)) = Composed::from_toml(&source.file, &text) else {
+        return text;
+    };
+    let mut pairs: Vec<(&ModelParameter, &ModelParameter)> = Vec::new();
+    let n = |m: &Composed| {
+        m.effects
+            .first()
+            .map_or(m.parameters.len(), |e| e.first_parameter)
+    };
+    let plant = model.parameters.iter().take(n(&model));
+    pairs.extend(plant.zip(best.parameters.iter().take(n(best))));
+    for effect in &model.effects {
+        if let Some(found) = best.effects.iter().find(|e| is(e, effect)) {
+            let to = model.parameters.iter().skip(effect.first_parameter);
+            let from = best.parameters.iter().skip(found.first_parameter);
+            pairs.extend(to.zip(from).take(effect.meta.parameters.len()));
+        }
+    }
+    let values: Vec<(Vec<Step>, f64)> = pairs
+        .into_iter()
+        .filter(|(_, from)| from.free)
+        .filter_map(|(to, from)| Some((to.path.clone(), from.value?)))
+        .collect();
+    present.with_values(&values)
+}

@@ -1,0 +1,180 @@
+//! Logs of numbers that are in memory.
+
+use loopsight_core::unit;
+use loopsight_recordings::{ColumnName, Table, TableRun, column};
+
+use super::Log;
+use crate::error::{Error, Result};
+
+/// A log in the making; see [`Log::in_memory`].
+///
+/// One run needs no more than its columns. Of several, each begins with [`LogBuilder::run`] and has the
+/// same columns as the first.
+#[derive(Clone, Debug)]
+#[must_use = "`build` makes the log"]
+pub struct LogBuilder {
+    name: String,
+    runs: Vec<Rows>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Rows {
+    name: String,
+    columns: Vec<Named>,
+}
+
+#[derive(Clone, Debug)]
+struct Named {
+    name: String,
+    unit: String,
+    values: Vec<f64>,
+}
+
+impl LogBuilder {
+    pub(super) fn new(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            runs: Vec::new(),
+        }
+    }
+
+    /// Begins another run: what was recorded in one go.
+    pub fn run(mut self, name: &str) -> Self {
+        self.runs.push(Rows {
+            name: name.to_owned(),
+            columns: Vec::new(),
+        });
+        self
+    }
+
+    /// A column of the present run: a name, its unit (`1` for a plain number), a value for each row;
+    /// `NaN` where there is none. One of them is `time`.
+    pub fn column(mut self, name: &str, unit: &str, values: impl Into<Vec<f64>>) -> Self {
+        if self.runs.is_empty() {
+            self.runs.push(Rows::default());
+        }
+        if let Some(run) = self.runs.last_mut() {
+            run.columns.push(Named {
+                name: name.to_owned(),
+                unit: unit.trim().to_owned(),
+                values: values.into(),
+            });
+        }
+        self
+    }
+
+    /// The log.
+    ///
+    /// # Errors
+    ///
+    /// There is no column or no row, a unit is none, two columns have one name, columns differ in length
+    /// or between runs.
+    pub fn build(self) -> Result<Log> {
+        let wrong = |why: String| Error::request(format!("{}: {why}", self.name));
+        let Some(first) = self.runs.first().filter(|run| !run.columns.is_empty()) else {
+            return Err(wrong("the log has no column".to_owned()));
+        };
+        for (i, named) in first.columns.iter().enumerate() {
+            if first.columns[..i].iter().any(|c| c.name == named.name) {
+                return Err(wrong(format!("two columns are named `{}`", named.name)));
+            }
+            if let Err(error) = unit::parse(&named.unit) {
+                return Err(wrong(format!(
+                    "column `{}`: `{}` is not a unit: at `{}`: {error}",
+                    named.name,
+                    named.unit,
+                    error.piece(&named.unit)
+                )));
+            }
+        }
+        let mut runs = Vec::with_capacity(self.runs.len());
+        for run in &self.runs {
+            let of = if run.name.is_empty() {
+                String::new()
+            } else {
+                format!(" of run `{}`", run.name)
+            };
+            let header = |run: &Rows| -> Vec<(String, String)> {
+                let columns = run.columns.iter();
+                columns.map(|c| (c.name.clone(), c.unit.clone())).collect()
+            };
+            if header(run) != header(first) {
+                return Err(wrong(format!(
+                    "the columns{of} are not those of the first run"
+                )));
+            }
+            let rows = run.columns[0].values.len();
+            if let Some(other) = run.columns.iter().find(|c| c.values.len() != rows) {
+                return Err(wrong(format!(
+                    "column `{}`{of} has {} values, column `{}` has {rows}",
+                    other.name,
+                    other.values.len(),
+                    run.columns[0].name
+                )));
+            }
+            runs.push(TableRun {
+                name: run.name.clone(),
+                rows: (0..rows)
+                    .flat_map(|k| run.columns.iter().map(move |c| c.values[k]))
+                    .collect(),
+                first_line: 0,
+                lines: Vec::new(),
+            });
+        }
+        if runs.iter().all(|run| run.rows.is_empty()) {
+            return Err(wrong("the log has no row".to_owned()));
+        }
+        let columns = first.columns.iter().map(|c| ColumnName {
+            text: column(&c.name, &c.unit),
+            name: c.name.clone(),
+            unit: Some(c.unit.clone()),
+        });
+        Ok(Log::of_table(Table {
+            columns: columns.collect(),
+            runs,
+            source: self.name.clone(),
+            ..Table::default()
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_together_is_refused_with_its_name() {
+        let begun = || Log::in_memory("bench").column("time", "s", [0.0, 0.1]);
+        let says = |builder: LogBuilder| builder.build().unwrap_err().to_string();
+        for (builder, part) in [
+            (Log::in_memory("bench"), "bench: the log has no column"),
+            (
+                Log::in_memory("bench").run("a").run("b"),
+                "bench: the log has no column",
+            ),
+            (
+                begun().column("u", "V", [1.0]),
+                "column `u` has 1 values, column `time` has 2",
+            ),
+            (
+                begun().column("time", "s", [0.0, 0.1]),
+                "two columns are named `time`",
+            ),
+            (
+                begun().column("u", "Volx", [0.0, 0.1]),
+                "`Volx` is not a unit",
+            ),
+            (
+                begun().run("b").column("t", "s", [0.0]),
+                "the columns of run `b` are not those of the first run",
+            ),
+            (
+                Log::in_memory("bench").column("time", "s", []),
+                "the log has no row",
+            ),
+        ] {
+            let said = says(builder);
+            assert!(said.contains(part), "{said}");
+        }
+    }
+}
