@@ -21,7 +21,7 @@ pub use settings::FeedbackLinearizingPiSettings;
 /// V   = E⁻¹(u)                                 undoes what lies between command and plant
 /// ν_k = k_p (β r_k - y_k) + z_k  [+ (r_k - r_{k-1})/T]                                (49)
 /// z_{k+1} = z_k + k_i T (r_k - y_k) + k_i T/(k_p β) (ν_a - ν_k)
-/// V_a = V held within ±V_max,  ν_a = f(ȳ) + G(ȳ) E(V_a),  ȳ = y + ν_a T/2
+/// V_a = clamp(V, -V_max, V_max),  ν_a = f(ȳ) + G(ȳ) E(V_a),  ȳ = y + ν_a T/2
 /// ```
 ///
 /// | symbol | what | unit |
@@ -118,6 +118,10 @@ where
 {
     /// A velocity loop with the gains of `H(s)` (1/s and 1/s², one per controlled state), limits
     /// (one per input, in its unit; infinity for none) and period (s).
+    ///
+    /// # Errors
+    ///
+    /// Lists of different lengths, or a gain, limit or period out of its range: see [`DesignError`].
     pub fn new(
         proportional: &OVector<f64, D>,
         integral: &OVector<f64, D>,
@@ -155,6 +159,10 @@ where
 
     /// The linearisation alone: a constant acceleration (one per controlled state, in its unit per
     /// second), whatever the reference.
+    ///
+    /// # Errors
+    ///
+    /// As [`FeedbackLinearizingPi::new`].
     pub fn open_loop(
         acceleration: &OVector<f64, D>,
         limit: &OVector<f64, D>,

@@ -42,6 +42,10 @@ where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
     /// From the input matrix `g`, row by row, as long as `like` squared.
+    ///
+    /// # Errors
+    ///
+    /// `g` has another length, is not finite, or has no inverse.
     pub fn new(g: &[f64], like: &OVector<f64, D>) -> Result<Self, Singular> {
         let n = like.len();
         let (dim, one) = like.shape_generic();

@@ -28,6 +28,10 @@ pub enum Singular {
 /// So the units of equations and unknowns do not matter. `a` (row by row, `b.len()²` entries) and `scale` (as
 /// long as `b`) are overwritten; `b` becomes `x`. Matrices without a pivot are refused.
 ///
+/// # Errors
+///
+/// A matrix that is singular, not finite, or of another length.
+///
 /// Reference: Golub, Van Loan (2013), "Matrix Computations", 3.4 and 3.5.2.
 ///
 /// ```
@@ -55,7 +59,7 @@ pub fn solve<S: Real>(a: &mut [S], b: &mut [S], scale: &mut [S]) -> Result<(), S
             }
         }
         let pivot = a[k * n + k];
-        // What is no number is no pivot either.
+        // A value that is not a number is no pivot either.
         let usable = pivot.abs() > S::zero();
         if !usable {
             return Err(why(a, b, scale));

@@ -273,7 +273,7 @@ mod tests {
         tracker.demand(&mut told);
         assert_eq!(asked, told);
         assert!((tracker.pose()[0] - 0.11).abs() < 1e-6);
-        // A speed that is no number moves nothing.
+        // A speed that is not a number moves nothing.
         let gap = [f32::NAN, 0.0];
         tracker
             .step(&tick, &[0.0; 2], &gap, &mut Unseen, &mut asked)

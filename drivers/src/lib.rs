@@ -11,7 +11,7 @@
 //! | `LinuxGpio` | the motors of `twil_motor` on the pins of a board that runs Linux | Linux |
 //!
 //! The host's drivers are parts of a loop file, `[driver.<id>]`. A driver of one's own is a few lines; here is one
-//! that refuses a command that is no number and comes to rest:
+//! that refuses a command that is not a number and comes to rest:
 //!
 //! ```
 //! use loopsight_core::{Driver, DriverFault, Sample};

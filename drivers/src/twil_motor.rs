@@ -26,7 +26,7 @@ pub use supply::{FixedSupply, Supply};
 pub use watchdog::{Guard, Watchdog};
 pub use wheel::{Pair, PairError, Wheel, WheelError, WheelSettings, Wheels};
 
-/// What went wrong at the motors.
+/// Why the motors were not driven, or not read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TwilMotorError<W, V, S> {
@@ -34,7 +34,7 @@ pub enum TwilMotorError<W, V, S> {
     Wheel(W),
     /// The meter of the supply.
     Supply(V),
-    /// The supply is below the least that the motors are driven with, or is no number.
+    /// The supply is below the least that the motors are driven with, or is not a number.
     SupplyLow {
         /// What it is, V.
         volts: S,
@@ -65,7 +65,7 @@ impl<W: fmt::Debug, V: fmt::Debug, S: fmt::Debug> fmt::Display for TwilMotorErro
                     "the supply is {volts:?} V, expected at least {least:?} V"
                 )
             }
-            Self::NotFinite(motor) => write!(f, "the command for motor {motor} is no number"),
+            Self::NotFinite(motor) => write!(f, "the command for motor {motor} is not a number"),
             Self::Halted(Guard::Stopped) => f.write_str("the motors were stopped before"),
             Self::Halted(_) => f.write_str("no command came in time: the motors were stopped"),
             Self::Length { found, expected } => write!(f, "{found} numbers, expected {expected}"),
@@ -99,7 +99,7 @@ impl<W: fmt::Debug, V: fmt::Debug, S: fmt::Debug> DriverError for TwilMotorError
 ///
 /// For velocities of a robot with wheels of radius `r`, `2 b` apart, `N` counts per turn and the period
 /// `T`, see [`velocity_gains`]; ones and zeros give the counts themselves. A tick's reading is always
-/// fresh. Commands that are no numbers, a supply below [`TwilMotor::with_least_supply`] and any failing
+/// fresh. Commands that are not numbers, a supply below [`TwilMotor::with_least_supply`] and any failing
 /// pin stop all motors before the error is told. Motors are stopped by shorting them, which is the 0 V of
 /// every model here.
 ///
@@ -204,8 +204,11 @@ impl<S: Real, W: Wheels<S>, V: Supply<S>, G: AsRef<[S]>> TwilMotor<S, W, V, G> {
         self
     }
 
-    /// A tick of the watchdog. Returns what it did to the motors where it did something: the reason
-    /// for a log.
+    /// A tick of the watchdog. Returns what it did to the motors if it did something.
+    ///
+    /// # Errors
+    ///
+    /// A pin that fails.
     pub fn tick(&mut self) -> Result<Option<Guard>, TwilMotorError<W::Error, V::Error, S>> {
         let changed = self.watchdog.tick();
         match changed {
@@ -250,7 +253,7 @@ impl<S: Real, W: Wheels<S>, V: Supply<S>, G: AsRef<[S]>> TwilMotor<S, W, V, G> {
         }
         let volts = self.supply.volts().map_err(TwilMotorError::Supply)?;
         let least = self.least_supply;
-        // A supply that is no number is not above anything.
+        // A supply that is not a number is not above anything.
         if !(volts.is_finite() && volts >= least && volts > S::zero()) {
             return Err(TwilMotorError::SupplyLow { volts, least });
         }

@@ -68,6 +68,10 @@ where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
     /// An estimator that starts from `theta`.
+    ///
+    /// # Errors
+    ///
+    /// `theta` is empty or not finite, or a setting is out of its range: see [`KalmanError`].
     pub fn new(theta: OVector<S, D>, settings: &KalmanSettings) -> Result<Self, KalmanError> {
         if !is_start(theta.as_slice()) {
             return Err(KalmanError::Theta);

@@ -65,6 +65,10 @@ where
     DefaultAllocator: Allocator<D>,
 {
     /// An estimator that starts from `theta`.
+    ///
+    /// # Errors
+    ///
+    /// `theta` is empty or not finite, or a setting is out of its range: see [`LmsError`].
     pub fn new(theta: OVector<S, D>, settings: &LmsSettings) -> Result<Self, LmsError> {
         settings.check()?;
         if !is_start(theta.as_slice()) {

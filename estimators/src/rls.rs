@@ -30,9 +30,8 @@ pub use settings::{Forgetting, RlsError, RlsSettings};
 /// **Rules of forgetting** ([`Forgetting`]).
 ///
 /// * `constant`: `λ` as it is set.
-/// * `variable`: as much is forgotten as was learned that is new, so that the memory keeps the same sum
-///   of squared errors. A parameter that jumps is found at once, and in quiet times little is
-///   forgotten. With `N = 1/(1 - λ)`, `q = e²/(1 + φᵀPφ)` and the mean `σ²` of `q` over `10 N` samples,
+/// * `variable`: the memory keeps the same sum of squared errors. A surprising sample makes it forget more, an
+///   expected one less. A parameter that jumps is found at once. With `N = 1/(1 - λ)`, `q = e²/(1 + φᵀPφ)` and the mean `σ²` of `q` over `10 N` samples,
 ///   of which none counts for more than `9 σ²`:
 ///   ```text
 ///   λ_k = 1 - q/(N σ²), not below λ_min
@@ -44,21 +43,19 @@ pub use settings::{Forgetting, RlsError, RlsSettings};
 ///   ```
 ///
 /// **Windup.** Where the regressor does not excite a parameter, forgetting alone lets `P` grow as
-/// `λ^-k` until the next real sample throws the estimate far off. The bound stops that: it
-/// counts the present estimate of the `i`-th parameter as one more measurement of it, just good
-/// enough to hold its variance at `p_max`. `θ` does not move by it, `P` only shrinks, and the
-/// other parameters go on forgetting at the full rate; suspending the forgetting altogether would
-/// make a robot that drives straight ahead, and so learns nothing about turning, lose track of the
-/// rest as well. The estimate is the exact minimum of the exponentially weighted squares plus
-/// these terms.
+/// `λ^-k` until the next real sample throws the estimate far off. The bound stops that. It counts the present estimate
+/// of the `i`-th parameter as one more measurement of it, just good enough to keep its variance at
+/// `p_max`. `θ` does not move by it, `P` only shrinks, and the other parameters go on forgetting at the
+/// full rate. Suspending all forgetting would be worse: a robot that drives straight ahead learns nothing
+/// about turning, and would lose track of the rest as well. The estimate is the exact minimum of the
+/// exponentially weighted squares plus these terms.
 ///
-/// **Round-off.** `P` is kept as `U D Uᵀ` (`U` unit upper triangular, `D` diagonal). Each entry of
-/// `D` is multiplied by positive numbers, or has positive ones added, so `P` cannot become indefinite
-/// however many updates there are, in `f32` as in `f64`, where the textbook difference `P - K φᵀP`
-/// does (1e-30 keeps an entry of `D` from underflow). The matrix that
-/// [`Estimator::covariance`] shows is rounded once more; its diagonal is enlarged by `4 n²` rounding
-/// units, more than those roundings and a Cholesky factorisation can take away (Higham 2002, theorem
-/// 10.7), so that it, too, is positive definite, and exactly symmetric.
+/// **Round-off.** `P` is kept as `U D Uᵀ` (`U` unit upper triangular, `D` diagonal). Each entry of `D` is
+/// multiplied by positive numbers, or has positive ones added. So `P` stays positive definite however many
+/// updates there are, in `f32` as in `f64`; the textbook difference `P - K φᵀP` does not. (1e-30 keeps an
+/// entry of `D` from underflow.) The matrix that [`Estimator::covariance`] shows is rounded once more. Its
+/// diagonal is enlarged by `4 n²` rounding units, more than those roundings and a Cholesky factorisation
+/// can take away (Higham 2002, theorem 10.7). So it is positive definite, too, and exactly symmetric.
 ///
 /// Assumptions: `y = φᵀθ + noise`, noise white and independent of `φ`; `θ` constant or slow against
 /// `1/(1 - λ)` samples.
@@ -100,6 +97,10 @@ where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
     /// An estimator that starts from `theta`.
+    ///
+    /// # Errors
+    ///
+    /// `theta` is empty or not finite, or a setting is out of its range: see [`RlsError`].
     pub fn new(theta: OVector<S, D>, settings: &RlsSettings) -> Result<Self, RlsError> {
         if !is_start(theta.as_slice()) {
             return Err(RlsError::Theta);

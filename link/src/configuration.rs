@@ -1,4 +1,4 @@
-//! All that a robot must be told before it may move.
+//! The configuration: everything a robot needs before it may move.
 
 use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
@@ -28,13 +28,13 @@ pub struct Configuration {
     /// For each controlled state the change over which dry friction takes its direction, in the
     /// state's unit.
     pub bands: Signals,
-    /// What is measured are means over the period (speeds made of encoder counts).
+    /// The measurements are means over the period, as speeds from encoder counts are.
     pub means: bool,
     /// What is learned; `None` learns nothing.
     pub learning: Option<Learning>,
     /// The control law.
     pub controller: ControllerGains,
-    /// When the robot stops of itself.
+    /// When the robot stops by itself.
     pub safety: Safety,
 }
 
@@ -66,7 +66,7 @@ pub struct Learning {
     pub scale: Values,
     /// Innovations up to this size teach nothing, one per controlled state, of its unit per second.
     pub dead_zone: Signals,
-    /// Least excitation, one per controlled state, of its unit per second; 0: all is learned from.
+    /// Least excitation, one per controlled state, of its unit per second; 0: every sample is learned from.
     pub least_excitation: Signals,
     /// Samples over which excitation and noise are averaged.
     pub window: f64,
@@ -85,12 +85,12 @@ pub struct ControllerGains {
     pub limit: Vec<f64, SIGNALS>,
 }
 
-/// When a robot stops of itself.
+/// When a robot stops by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Safety {
-    /// Periods without a message to act upon until the motors are let go.
+    /// Periods without a valid step until the motors are let go.
     pub watchdog_ticks: u16,
-    /// Age of a measurement from which on it teaches nothing, µs.
+    /// A measurement older than this is stale: nothing is learned from it, µs.
     pub stale_us: u32,
     /// Stale measurements one after the other until the robot stops.
     pub stale_ticks: u16,
@@ -99,6 +99,6 @@ pub struct Safety {
     /// Periods in which an input of more than `encoder_input` moves nothing until the encoder counts as
     /// disconnected.
     pub encoder_ticks: u16,
-    /// Input from which on every wheel turns, in the unit of the inputs.
+    /// An input of this size turns every wheel, in the unit of the inputs.
     pub encoder_input: f32,
 }

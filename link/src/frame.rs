@@ -1,11 +1,11 @@
-//! Frames: a sum that notices what the line does, and a byte that separates.
+//! Frames: a checksum that detects errors of the line, and a byte that separates messages.
 
 use core::fmt;
 
 use crc::{CRC_32_ISCSI, Crc};
 use serde::{Serialize, de::DeserializeOwned};
 
-/// Longest message with its sum, bytes.
+/// Longest message with its checksum, bytes.
 pub const MESSAGE: usize = 896;
 /// Longest frame, bytes: one more per 254, one at the start, and the zero.
 pub const LONGEST: usize = MESSAGE + MESSAGE / 254 + 2;
@@ -18,15 +18,15 @@ pub const LONGEST: usize = MESSAGE + MESSAGE / 254 + 2;
 /// International Conference on Dependable Systems and Networks, 459–468, table 1.
 static SUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
-/// Why no message came out of a frame, or no frame out of a message.
+/// Why a frame has no message, or a message makes no frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FrameError {
     /// More bytes than [`LONGEST`], or than the buffer holds.
     TooLong,
-    /// Not a frame: bytes are missing.
+    /// Bytes of the frame are missing.
     Cut,
-    /// The sum is wrong, or what it belongs to is no message.
+    /// The checksum is wrong, or the bytes are not a message.
     Broken,
 }
 
@@ -35,14 +35,18 @@ impl fmt::Display for FrameError {
         f.write_str(match self {
             FrameError::TooLong => "the frame is too long",
             FrameError::Cut => "bytes of the frame are missing",
-            FrameError::Broken => "the frame's sum is wrong",
+            FrameError::Broken => "the frame's checksum is wrong",
         })
     }
 }
 
 impl core::error::Error for FrameError {}
 
-/// Writes the frame of `message` into `buffer`; its length.
+/// Writes the frame of `message` into `buffer`; returns its length.
+///
+/// # Errors
+///
+/// [`FrameError::TooLong`] if the message does not fit; the messages of this crate do.
 pub fn encode<T: Serialize>(message: &T, buffer: &mut [u8; LONGEST]) -> Result<usize, FrameError> {
     let mut plain = [0; MESSAGE];
     let plain = postcard::to_slice_crc32(message, &mut plain, SUM.digest())
@@ -73,7 +77,7 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// Takes one byte; a message, or what was wrong with it, when the byte ends a frame.
+    /// Takes one byte. When the byte ends a frame, returns its message or what is wrong with it.
     pub fn take<T: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<T, FrameError>> {
         if byte != 0 {
             match self.buffer.get_mut(self.length) {
@@ -109,7 +113,7 @@ impl Decoder {
 fn decode<T: DeserializeOwned>(frame: &mut [u8]) -> Result<T, FrameError> {
     let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Cut)?;
     let plain = frame.get(..length).ok_or(FrameError::Cut)?;
-    // The sum belongs to all of it: a message with something after it is none.
+    // The checksum covers the whole frame: bytes after the message are an error.
     match postcard::take_from_bytes_crc32(plain, SUM.digest()) {
         Ok((message, [])) => Ok(message),
         _ => Err(FrameError::Broken),

@@ -11,7 +11,7 @@ pub type Signals = Vec<f32, SIGNALS>;
 /// One number per parameter.
 pub type Values = Vec<f32, PARAMETERS>;
 
-/// What a host says.
+/// A message from the host.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(
     clippy::large_enum_variant,
@@ -29,7 +29,7 @@ pub enum Request {
     },
     /// One tick of the loop.
     Step(Measured),
-    /// Come to rest.
+    /// Stop the motors.
     Stop {
         /// Number of the session.
         session: u32,
@@ -56,7 +56,7 @@ pub struct Welcome {
     pub plant: String<NAME>,
 }
 
-/// What a tick begins with.
+/// A step of the host: measurement and reference of a tick.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
     /// Number of the session.
@@ -70,45 +70,45 @@ pub struct Measured {
     /// What was measured: the controlled states first. Empty for a robot with sensors of its own, which
     /// ticks by its own timer and takes the reference only.
     pub measured: Signals,
-    /// Where the controlled states should be now.
+    /// Reference of the controlled states.
     pub reference: Signals,
 }
 
-/// What a robot with sensors of its own began a tick with.
+/// What a robot with sensors of its own measured at a tick, and the reference it followed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensed {
     /// Voltage of the supply, V.
     pub supply: f32,
     /// What it measured: the controlled states.
     pub measured: Signals,
-    /// Where they should have been: the last reference that it heard.
+    /// The reference: the last one that it heard.
     pub reference: Signals,
 }
 
-/// What a tick ends with.
+/// What a robot did in a tick.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Act {
     /// Number of the session.
     pub session: u32,
     /// Number of the tick.
     pub tick: u32,
-    /// What the motors get, in the unit of the inputs.
+    /// The inputs that the motors get.
     pub command: Signals,
     /// The plant's parameters, the learned ones as they are estimated now.
     pub parameters: Values,
-    /// An actuator was asked for more than it can give.
+    /// An input was clamped to its limit.
     pub saturated: bool,
     /// The command is the last one that could be computed.
     pub held: bool,
-    /// Regressions that learned from this tick, one bit each.
+    /// Controlled states whose estimator learned from this tick, one bit each.
     pub learned: u8,
-    /// Cost of the tick before in the robot's own unit (its README says which); 0 where not known.
+    /// Cost of the tick before, in the robot's own unit (its README says which); 0 if not known.
     pub cost: u32,
     /// What the tick began with, where the robot measured it itself.
     pub sensed: Option<Sensed>,
 }
 
-/// What a robot says.
+/// A message from the robot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reply {
     /// Answer to the greeting; the first of all messages in all versions.

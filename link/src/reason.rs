@@ -10,26 +10,26 @@ use serde::{Deserialize, Serialize};
 pub enum Reason {
     /// The host asked for it.
     Asked,
-    /// No message to act upon came in time.
+    /// No valid step came in time.
     LinkLost,
-    /// The host greeted anew in the middle of a run.
+    /// The host greeted again in the middle of a run.
     HostRestarted,
-    /// A message of another session, or before any greeting: this robot was started anew.
+    /// A message of another session, or before any greeting: this robot was restarted.
     OtherSession,
     /// A step before a configuration.
     NotConfigured,
-    /// Steps do not follow one another; what was expected and what came.
+    /// A step is out of order.
     OutOfOrder {
         /// Number of the tick that was expected.
         expected: u32,
         /// Number that came.
         found: u32,
     },
-    /// The measurements are too old for too long.
+    /// The measurements have been too old for too long.
     Stale,
-    /// A wheel is driven, and its encoder counts nothing; index of the signal.
+    /// A wheel is driven and its encoder does not count; index of its input.
     EncoderLost(u8),
-    /// A measurement or a reference that is no number, or too few of them.
+    /// A measurement or a reference is not finite, or values are missing.
     NotFinite,
     /// The supply is below its least voltage.
     SupplyLow,
@@ -102,10 +102,10 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Reason::Asked => f.write_str("the host asked for it"),
-            Reason::LinkLost => f.write_str("nothing to act upon came from the host in time"),
-            Reason::HostRestarted => f.write_str("the host was started anew"),
+            Reason::LinkLost => f.write_str("no step came from the host in time"),
+            Reason::HostRestarted => f.write_str("the host was restarted"),
             Reason::OtherSession => {
-                f.write_str("the message belongs to another session: the robot was started anew")
+                f.write_str("the message belongs to another session: the robot was restarted")
             }
             Reason::NotConfigured => f.write_str("a step came before any configuration"),
             Reason::OutOfOrder { expected, found } => {
@@ -114,10 +114,9 @@ impl fmt::Display for Reason {
             Reason::Stale => f.write_str("the measurements have been too old for too long"),
             Reason::EncoderLost(i) => write!(
                 f,
-                "the motors are driven and measured signal {i} does not move: is its encoder \
-                 connected?"
+                "input {i} drives a motor whose encoder does not count: is the encoder connected?"
             ),
-            Reason::NotFinite => f.write_str("a measurement or a reference is no number"),
+            Reason::NotFinite => f.write_str("a measurement or a reference is not a number"),
             Reason::SupplyLow => f.write_str("the supply is below its least voltage"),
             Reason::NoCommand => f.write_str("the control law had no command"),
             Reason::NoSensors => f.write_str(

@@ -252,11 +252,11 @@ impl ControllerPart for Aboard {
 
 impl Aboard {
     /// What the robot tells: parameters of the plant's equations that are learned aboard, those that enter
-    /// linearly and that the file does not hold.
+    /// linearly and that the file leaves free.
     fn told(&self, model: &Model) -> Told {
-        let held = |id: &str| model.parameters.iter().any(|p| p.name == id && !p.free);
+        let frozen = |id: &str| model.parameters.iter().any(|p| p.name == id && !p.free);
         let parameters = model.plant.parameters.iter().enumerate();
-        let learned = parameters.filter(|(_, p)| self.rls.is_some() && p.linear && !held(p.id));
+        let learned = parameters.filter(|(_, p)| self.rls.is_some() && p.linear && !frozen(p.id));
         Told::new(model, learned.map(|(i, _)| i).collect())
     }
 }

@@ -1,4 +1,4 @@
-//! What stands between a loop aboard and its robot: values put in, values taken out.
+//! The driver of a loop aboard: values are put in before a tick and taken out after it.
 
 use loopsight_core::{Array, Clock, Driver, DriverFault, Real, Sample};
 
@@ -8,13 +8,13 @@ use loopsight_core::{Array, Clock, Driver, DriverFault, Real, Sample};
 /// are zero. `A` is the array `[S; N]`.
 #[derive(Clone, Debug)]
 pub struct Port<S, A> {
-    /// What the next tick measures.
+    /// The measurement of the next tick.
     pub measured: A,
-    /// The measurement is young enough to learn from.
+    /// The measurement is fresh enough to learn from.
     pub fresh: bool,
     /// Largest magnitude of an input that the supply can give.
     pub most: S,
-    /// What the last tick applied.
+    /// The inputs that the last tick applied.
     pub applied: A,
 }
 

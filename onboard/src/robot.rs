@@ -1,4 +1,4 @@
-//! The loop of a configuration.
+//! The loop aboard, made from a configuration.
 
 use loopsight_core::{Array, Command, Loop, Plant};
 use loopsight_link::{Configuration, ControllerGains, Unusable};
@@ -7,7 +7,7 @@ use crate::law::OnboardLaw;
 use crate::parts::{Parts, PerInput, PerParameter};
 use crate::{AffinePlant, Efforts, Learner, Port, Prompted};
 
-/// A loop in fixed sizes, as a configuration says.
+/// The loop aboard: driver, model, learning and control law, as a configuration says.
 pub struct Robot<R: Parts> {
     inner: Inner<R>,
     gains: ControllerGains,
@@ -29,7 +29,7 @@ impl<R: Parts<Scalar = f32>> Robot<R> {
     ///
     /// # Errors
     ///
-    /// What of the configuration is not for these [`Parts`], or cannot be used.
+    /// The first thing in the configuration that does not fit these [`Parts`], or cannot be used.
     pub fn new(configuration: &Configuration, period: f64) -> Result<Self, Unusable> {
         let (model, learner, parameters) = parts(configuration, period)?;
         let gains = &configuration.controller;
@@ -54,8 +54,12 @@ impl<R: Parts<Scalar = f32>> Robot<R> {
         })
     }
 
-    /// Takes an improved model while it runs: model and learning start from it, the control law keeps its
-    /// integrals where its gains are the same.
+    /// Takes an improved model while it runs. Model and learning start from it. The control law keeps its
+    /// integrals if its gains are the same.
+    ///
+    /// # Errors
+    ///
+    /// As [`Robot::new`]; the robot then goes on as before.
     pub fn improve(&mut self, configuration: &Configuration, period: f64) -> Result<(), Unusable> {
         let mut next = Self::new(configuration, period)?;
         if next.gains == self.gains {
@@ -98,17 +102,19 @@ impl<R: Parts<Scalar = f32>> Robot<R> {
         }
     }
 
-    /// Rows that the last tick taught, one bit each.
+    /// Controlled states whose estimator learned from the last tick, one bit each.
     pub fn learned(&self) -> u8 {
         self.inner.observer.as_ref().map_or(0, Learner::learned)
     }
 }
 
 /// Model and learning of a configuration, and the parameters that both start from.
+type Made<R> = (AffinePlant<R>, Option<Learner<R>>, PerParameter<R>);
+
 fn parts<R: Parts<Scalar = f32>>(
     configuration: &Configuration,
     period: f64,
-) -> Result<(AffinePlant<R>, Option<Learner<R>>, PerParameter<R>), Unusable> {
+) -> Result<Made<R>, Unusable> {
     let meta = &R::Plant::META;
     if configuration.plant != meta.id {
         return Err(Unusable::Plant);

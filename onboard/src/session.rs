@@ -10,7 +10,7 @@ use crate::Robot;
 use crate::parts::{Parts, PerInput, PerParameter};
 use crate::watch::Watch;
 
-/// Tells what a tick costs, in a unit of the board's own.
+/// Measures what a tick costs, in a unit of the board's own.
 pub trait Meter {
     /// Called before a tick.
     fn start(&mut self);
@@ -35,20 +35,22 @@ pub struct Sensors<A> {
     pub supply: f32,
 }
 
-/// A robot as its host talks to it: greeted, configured, running, at rest.
+/// The robot's end of the conversation with its host: greeted, configured, running, at rest.
 ///
-/// A robot without sensors ([`Session::new`]) is measured by its host, and answers each step with a command:
-/// its board calls [`Session::elapsed`] once per period. One with motors and encoders of its own
-/// ([`Session::with_sensors`]) ticks by its own timer, its board calls [`Session::sensed`] instead, and hands
-/// [`Session::output`] to the motors after it; steps of the host bring the reference.
+/// `R` lists what is compiled in ([`Parts`]), `M` measures what a tick costs ([`Meter`]).
 ///
-/// At any end of a run the motors are let go, the reason is said, and nothing but a new configuration
-/// lets the robot move again. Reasons are those of [`Reason`]:
+/// A robot without sensors ([`Session::new`]) is measured by its host and answers each step with a command.
+/// Its board calls [`Session::elapsed`] once per period. A robot with motors and encoders of its own
+/// ([`Session::with_sensors`]) ticks by its own timer. Its board calls [`Session::sensed`] instead, and then
+/// hands [`Session::output`] to the motors. The host's steps bring the reference.
 ///
-/// * nothing to act upon for longer than the watchdog allows, whatever else came over the line;
-/// * messages of another session, or steps that do not follow one another: one side was started anew;
-/// * measurements that are too old, are no numbers, or do not move while the motors are driven;
-/// * a supply that sags.
+/// However a run ends, the motors are let go and the robot says why. Only a new configuration lets it move
+/// again. A run ends ([`Reason`]) when
+///
+/// * no valid step came for longer than the watchdog allows, whatever else came over the line;
+/// * a message belongs to another session, or a step is out of order: one side was restarted;
+/// * measurements are too old, are not finite, or do not move while the motors are driven;
+/// * the supply is too low.
 pub struct Session<R: Parts, M> {
     meter: M,
     period_us: u32,
@@ -65,7 +67,7 @@ pub struct Session<R: Parts, M> {
 struct Run<R: Parts> {
     robot: Robot<R>,
     watch: Watch,
-    /// A step has come since the configuration.
+    /// A step has come since the configuration was taken.
     begun: bool,
     /// The reference of the last step, for a robot with sensors of its own.
     wanted: PerInput<R>,
@@ -77,7 +79,7 @@ impl<R: Parts<Scalar = f32>, M: Meter> Session<R, M> {
         const {
             assert!(
                 PerInput::<R>::LENGTH <= SIGNALS && PerParameter::<R>::LENGTH <= PARAMETERS,
-                "a message does not hold this plant"
+                "a message has no room for this plant's inputs or parameters"
             );
         }
         Self {
@@ -114,8 +116,8 @@ impl<R: Parts<Scalar = f32>, M: Meter> Session<R, M> {
             .map(|run| run.robot.applied())
     }
 
-    /// Takes one byte of the line. Broken frames are counted, and not answered: who waits for the answer
-    /// notices.
+    /// Takes one byte of the line. Broken frames are counted and not answered: the host notices that no
+    /// answer comes.
     pub fn take(&mut self, byte: u8, say: &mut dyn FnMut(&Reply)) {
         match self.decoder.take::<Request>(byte) {
             Some(Ok(request)) => self.answer(request, say),
@@ -124,8 +126,8 @@ impl<R: Parts<Scalar = f32>, M: Meter> Session<R, M> {
         }
     }
 
-    /// A period of the board's timer has gone by: what its sensors say, or `None` where motors or sensors
-    /// failed.
+    /// A period of the board's timer has gone by. `sensors` is what the board measured, `None` if motors or
+    /// sensors failed.
     pub fn sensed(&mut self, sensors: Option<Sensors<PerInput<R>>>, say: &mut dyn FnMut(&Reply)) {
         self.elapsed(say);
         if self.run.as_ref().is_none_or(|run| !run.begun) {
@@ -231,8 +233,8 @@ impl<R: Parts<Scalar = f32>, M: Meter> Session<R, M> {
         }
     }
 
-    /// A configuration that cannot be used stops a robot that runs: what its host believes of it would not
-    /// be true.
+    /// A configuration that cannot be used stops a running robot: otherwise it would run something else than
+    /// its host believes.
     fn configure(
         &mut self,
         configuration: &Configuration,
@@ -291,8 +293,8 @@ impl<R: Parts<Scalar = f32>, M: Meter> Session<R, M> {
         Ok(())
     }
 
-    /// One tick of the loop, and what is said of it. On its own: within the conversation around it the
-    /// compiler keeps more alive than its registers hold, which costs a tick some 200 instructions.
+    /// One tick of the loop, and its report. A function of its own: inlined into the conversation, a tick costs
+    /// some 200 instructions more, because registers run out.
     #[inline(never)]
     fn act(
         &mut self,

@@ -1,4 +1,4 @@
-//! What a robot watches over by itself, message or none.
+//! What a robot checks by itself, whether messages come or not.
 
 use heapless::Vec;
 use loopsight_core::{Array, Place, Plant, Role};
@@ -7,7 +7,7 @@ use loopsight_link::{Reason, SIGNALS, Safety, Unusable};
 /// Speed of a shaft, in its unit, below which its encoder counts nothing.
 const STILL: f32 = 1e-6;
 
-/// Counts what must not last.
+/// Counts, in periods, what must not last.
 pub(crate) struct Watch {
     safety: Safety,
     quiet: u16,
@@ -67,12 +67,12 @@ impl Watch {
         Ok(())
     }
 
-    /// A message to act upon has come.
+    /// A valid step has come.
     pub(crate) fn heard(&mut self) {
         self.quiet = 0;
     }
 
-    /// A measurement so old (µs), at this supply (V); whether it is young enough to learn from.
+    /// Checks the age of a measurement (µs) and the supply (V). True if it is fresh enough to learn from.
     pub(crate) fn measured(&mut self, age_us: u32, supply: f32) -> Result<bool, Reason> {
         if supply.is_nan() || supply < self.safety.least_supply {
             return Err(Reason::SupplyLow);
@@ -89,7 +89,7 @@ impl Watch {
         Ok(fresh)
     }
 
-    /// Compares what the motors got with what their encoders say of it.
+    /// Checks that the encoder of each driven motor moves.
     pub(crate) fn turned<P: Plant>(
         &mut self,
         applied: &P::Input<f32>,

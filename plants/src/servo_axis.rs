@@ -10,7 +10,7 @@ use loopsight_core::{
 /// ```text
 /// q'  = v                  M v' = F - F_v v + w
 /// v̂'  = (v - v̂)/T          F' = (k_f u - F)/T_d
-/// u   = k_v (k_p (q_ref - q) - v̂) + u_d,   held within ±u_max
+/// u   = clamp(k_v (k_p (q_ref - q) - v̂) + u_d, -u_max, u_max)
 /// ```
 ///
 /// | symbol | what | unit |

@@ -12,7 +12,7 @@ use crate::at_rest::at_rest;
 use crate::per_channel::PerChannel;
 use crate::{PiResponse, Rule, SampledPi, gains};
 
-/// What the TOML table of `feedback_linearizing_pi` holds: gains, or what they follow from, or an
+/// The table of `feedback_linearizing_pi` in TOML: gains, or what they follow from, or an
 /// acceleration without feedback.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -110,8 +110,11 @@ enum Demand {
 }
 
 impl FeedbackLinearizingPiSettings {
-    /// Gains `(K_p, K_i)` of `n` controlled states, for who runs the law elsewhere; an error where the
-    /// table asks for a constant acceleration or a feedforward.
+    /// Gains `(K_p, K_i)` of `n` controlled states, for a law that runs elsewhere.
+    ///
+    /// # Errors
+    ///
+    /// The table asks for a constant acceleration or a feedforward, or its gains cannot be used.
     pub fn gains(&self, n: usize) -> Result<Vec<(f64, f64)>, BuildError> {
         let only = "this runs the law from gains alone";
         if self.feedforward {
@@ -129,6 +132,10 @@ impl FeedbackLinearizingPiSettings {
     }
 
     /// Largest commands of `n` inputs, in their unit; infinite where none is given.
+    ///
+    /// # Errors
+    ///
+    /// Another number of limits than inputs.
     pub fn limits(&self, n: usize) -> Result<Vec<f64>, BuildError> {
         match &self.limit {
             None => Ok(vec![f64::INFINITY; n]),

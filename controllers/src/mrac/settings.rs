@@ -12,7 +12,7 @@ use crate::Mixing;
 use crate::at_rest::at_rest;
 use crate::per_channel::PerChannel;
 
-/// What the TOML table of `mrac` holds.
+/// The table of `mrac` in TOML.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MracSettings {

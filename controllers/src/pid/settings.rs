@@ -12,7 +12,7 @@ use crate::Mixing;
 use crate::at_rest::at_rest;
 use crate::per_channel::PerChannel;
 
-/// What the TOML table of `pid` holds: gains, or the time constant that they are tuned for.
+/// The table of `pid` in TOML: gains, or the time constant that they are tuned for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PidSettings {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Path, Trajectory};
 
-/// What the TOML table of `trajectory` holds.
+/// The table of `trajectory` in TOML.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrajectorySettings {

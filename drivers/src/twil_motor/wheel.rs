@@ -7,7 +7,7 @@ use loopsight_core::{Limits, Real};
 use super::bridge::Bridge;
 use super::quadrature::{Quadrature, turned};
 
-/// What a wheel is held to, and which way round it is wired.
+/// The limits of a wheel, and which way round it is wired.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSettings<S> {
@@ -50,9 +50,9 @@ pub enum WheelError<B, Q> {
 /// A motor on a bridge, with an encoder on its shaft.
 ///
 /// ```text
-/// c = min(max(u, -m), m)     held to slew r per period T
+/// c = clamp(u, -m, m)        changed by r T per period at most
 /// c = 0                      for n ticks where its sign changes
-/// s = min(max(c/U, -1), 1)   share of the supply, rounded to steps of the PWM
+/// s = clamp(c/U, -1, 1)      share of the supply, rounded to steps of the PWM
 /// ```
 ///
 /// | symbol | what | unit |
@@ -99,20 +99,24 @@ impl<S: Real, B: Bridge<S>, Q: Quadrature> Wheel<S, B, Q> {
     }
 
     /// Puts `volts` on the motor, `period` s after the last ones, from a supply of `supply` V.
-    /// Returns what is really applied.
+    /// Returns the voltage that is really applied.
+    ///
+    /// # Errors
+    ///
+    /// A pin that fails.
     pub fn drive(
         &mut self,
         volts: S,
         supply: S,
         period: S,
     ) -> Result<S, WheelError<B::Error, Q::Error>> {
-        let mut held = [volts];
-        self.limits.clamp(period, &mut held);
-        let wanted = direction(held[0]);
+        let mut limited = [volts];
+        self.limits.clamp(period, &mut limited);
+        let wanted = direction(limited[0]);
         if wanted == -self.direction && wanted != 0 && self.rested < self.settings.dead_ticks {
-            held[0] = S::zero();
+            limited[0] = S::zero();
         }
-        let [volts] = held.map(|v| v.clamp(-supply, supply));
+        let [volts] = limited.map(|v| v.clamp(-supply, supply));
         match direction(volts) {
             0 => self.rested = self.rested.saturating_add(1),
             now => (self.direction, self.rested) = (now, 0),
@@ -129,18 +133,30 @@ impl<S: Real, B: Bridge<S>, Q: Quadrature> Wheel<S, B, Q> {
     }
 
     /// Lets the motor turn freely; a later slew starts at 0 V.
+    ///
+    /// # Errors
+    ///
+    /// A pin that fails.
     pub fn coast(&mut self) -> Result<(), WheelError<B::Error, Q::Error>> {
         self.limits.start(&[S::zero()]);
         self.bridge.coast().map_err(WheelError::Bridge)
     }
 
     /// Shorts the motor; a later slew starts at 0 V.
+    ///
+    /// # Errors
+    ///
+    /// A pin that fails.
     pub fn brake(&mut self) -> Result<(), WheelError<B::Error, Q::Error>> {
         self.limits.start(&[S::zero()]);
         self.bridge.brake().map_err(WheelError::Bridge)
     }
 
     /// Counts since the last call, positive forwards; 0 at the first.
+    ///
+    /// # Errors
+    ///
+    /// A counter that fails.
     pub fn counts(&mut self) -> Result<i32, WheelError<B::Error, Q::Error>> {
         let now = self.encoder.position().map_err(WheelError::Encoder)?;
         let before = self.position.replace(now).unwrap_or(now);

@@ -7,7 +7,7 @@ use loopsight_core::Real;
 use crate::estimate::NO_START;
 use crate::factor::LEAST;
 
-/// What the TOML table of `kalman` holds.
+/// The table of `kalman` in TOML.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "std",
@@ -54,7 +54,7 @@ impl KalmanSettings {
     }
 }
 
-/// Why an estimator could not be made; each variant holds what was found.
+/// Why an estimator could not be made. Each variant carries the value that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum KalmanError {

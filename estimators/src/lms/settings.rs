@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::estimate::NO_START;
 
-/// What the TOML table of `lms` holds.
+/// The table of `lms` in TOML.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "std",
@@ -46,7 +46,7 @@ impl LmsSettings {
     }
 }
 
-/// Why an estimator could not be made; each variant holds what was found.
+/// Why an estimator could not be made. Each variant carries the value that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LmsError {

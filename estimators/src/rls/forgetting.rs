@@ -43,7 +43,7 @@ impl<S: Real> Memory<S> {
             return self.forgetting;
         }
         let share = square / (self.length * self.square);
-        // Without any noise the share is no number: then there is nothing new either.
+        // Without any noise the share is not a number: then there is nothing new either.
         if share.is_finite() {
             (S::one() - share).max(self.least)
         } else {

@@ -24,7 +24,7 @@ pub enum Forgetting {
     Directional,
 }
 
-/// What the TOML table of `rls` holds.
+/// The table of `rls` in TOML.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "std",
@@ -92,7 +92,7 @@ impl RlsSettings {
     }
 }
 
-/// Why an estimator could not be made; each variant holds what was found.
+/// Why an estimator could not be made. Each variant carries the value that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RlsError {

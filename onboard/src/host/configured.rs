@@ -1,4 +1,4 @@
-//! A model file and a loop file as the one message that a robot is told.
+//! Makes a robot's configuration message from a model file and a loop file.
 
 use heapless::{String, Vec};
 use loopsight_core::learning::Range;
@@ -12,7 +12,7 @@ use nalgebra::DVector;
 use super::Aboard;
 use crate::acts_aboard;
 
-/// An error at a key of a table within `[controller.aboard]`.
+/// Moves an error's key into a table within `[controller.aboard]`.
 fn within(table: &str, error: BuildError) -> BuildError {
     let key = if error.key.is_empty() {
         table.to_owned()
@@ -45,7 +45,11 @@ fn numbers<const N: usize>(
 }
 
 impl Aboard {
-    /// All that a robot is told of `model`.
+    /// The configuration message for `model`.
+    ///
+    /// # Errors
+    ///
+    /// What of the model or of this table a robot cannot run, with the key.
     pub fn configuration(&self, model: &Model, period: f64) -> Result<Configuration, BuildError> {
         let plant = model.plant;
         let n = plant.controlled.len();
@@ -110,7 +114,7 @@ impl Aboard {
         for (declaration, value) in declared.iter().zip(parameters) {
             let named = model.parameters.iter().find(|p| p.name == declaration.id);
             let range = match settings.range.get(declaration.id) {
-                // What a file holds stays where it is.
+                // A parameter that the file freezes stays where it is.
                 _ if named.is_some_and(|p| !p.free) => [*value; 2],
                 Some([low, high]) if low < high && (*low..=*high).contains(value) => [*low, *high],
                 Some(range) => {
@@ -147,7 +151,7 @@ impl Aboard {
     }
 }
 
-/// An effect of the model, where a robot knows it and can do something about it.
+/// An effect of the model as a robot is told it. Refused if no robot can compensate it.
 fn attachment(
     model: &Model,
     plant: &PlantMeta,

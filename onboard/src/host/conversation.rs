@@ -1,4 +1,4 @@
-//! What a host says to a robot, from the greeting to the end.
+//! The host's end of the conversation with a robot.
 
 use std::collections::VecDeque;
 
@@ -18,7 +18,7 @@ pub(super) struct Conversation {
     period_us: u32,
     session: u32,
     begun: bool,
-    /// What the robot did while something else was waited for.
+    /// Acts that arrived while another message was awaited.
     acts: VecDeque<Act>,
     #[cfg(unix)]
     door: Option<Door>,
@@ -30,24 +30,24 @@ pub(super) struct Conversation {
 #[derive(Debug)]
 pub(super) struct Greeted {
     pub(super) welcome: Welcome,
-    /// Somebody runs it, and answered for it.
+    /// Another program runs it, and answered for it.
     pub(super) runs: bool,
-    /// It came to rest by the greeting.
+    /// The greeting stopped it.
     pub(super) interrupted: bool,
 }
 
-/// A number that no session before had: of the random keys that the standard library draws.
+/// A random number for a session, from the random keys of the standard library's hasher.
 fn drawn() -> u32 {
     use std::hash::{BuildHasher, RandomState};
     RandomState::new().hash_one(std::process::id()) as u32
 }
 
-/// Numbers as they travel; as many as the configuration has, which fits.
+/// Numbers in single precision, as messages carry them.
 fn told(values: &[f64]) -> Signals {
     values.iter().map(|v| *v as f32).take(SIGNALS).collect()
 }
 
-/// What is wrong with a configuration, with the names of its effects.
+/// What is wrong with a configuration, naming the effect.
 fn named(what: Unusable, configuration: &Configuration) -> String {
     let of = |i: u8| {
         let effect = configuration.effects.get(usize::from(i));
@@ -82,20 +82,20 @@ impl Conversation {
         }
     }
 
-    /// The same, with a socket at which another model is taken while the robot runs.
+    /// The same, with a socket through which a running robot is given another model.
     pub(super) fn with_door(mut self, at: Option<&String>) -> Self {
         self.door_at = at.cloned();
         self
     }
 
-    /// A new session, begun when something is next to be said.
+    /// Drops the session: the next message begins a new one.
     pub(super) fn renew(&mut self) {
         self.session = drawn();
         self.begun = false;
         self.acts.clear();
     }
 
-    /// Greets and configures, the first time. What a robot says of itself meanwhile is of no matter.
+    /// Greets and configures the robot if that was not done yet.
     pub(super) fn begin(&mut self) -> Result<(), LineError> {
         if self.begun {
             return Ok(());
@@ -112,7 +112,7 @@ impl Conversation {
         Ok(())
     }
 
-    /// Greets; what the robot answers.
+    /// Greets the robot; returns its answer.
     pub(super) fn greet(&mut self) -> Result<Greeted, LineError> {
         let session = self.session;
         let hello = Hello {
@@ -191,7 +191,7 @@ impl Conversation {
         }
     }
 
-    /// Sees to the door: another model is passed on to the robot. What there is to say of it.
+    /// Passes another model on to the robot, if one came through the door; returns a remark for the log.
     #[cfg(unix)]
     pub(super) fn serve(&mut self) -> Result<Option<String>, LineError> {
         let Some(mut door) = self.door.take() else {
@@ -239,7 +239,7 @@ impl Conversation {
         said
     }
 
-    /// There are no doors.
+    /// Without unix sockets there is no door.
     #[cfg(not(unix))]
     pub(super) fn serve(&mut self) -> Result<Option<String>, LineError> {
         Ok(None)
@@ -254,8 +254,8 @@ impl Conversation {
         }
     }
 
-    /// Says a step with a measurement so many periods old; of a robot with sensors of its own nothing was
-    /// measured here.
+    /// Sends a step with a measurement that is `age` periods old. For a robot with sensors of its own the
+    /// measurement is empty.
     pub(super) fn step(
         &mut self,
         tick: u32,
@@ -273,7 +273,7 @@ impl Conversation {
         }))
     }
 
-    /// The robot's next act, with as many commands as it should have.
+    /// The robot's next act; an error if its number of commands is wrong.
     pub(super) fn act(&mut self, commands: usize) -> Result<Act, LineError> {
         let session = self.session;
         let act = match self.acts.pop_front() {
@@ -288,7 +288,7 @@ impl Conversation {
         Ok(act)
     }
 
-    /// An error where the robot sent another number of something than it should.
+    /// An error if the robot sent another number of values than expected.
     pub(super) fn sized(
         &self,
         what: &'static str,
@@ -306,7 +306,7 @@ impl Conversation {
         })
     }
 
-    /// Lets the robot go, and keeps the line open until it has said that it rests.
+    /// Stops the robot, and waits until it says that it is at rest.
     pub(super) fn stop(&mut self) -> Result<(), LineError> {
         if !self.begun {
             return Ok(());

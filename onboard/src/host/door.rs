@@ -1,4 +1,4 @@
-//! Where another model is taken while a robot runs: a unix socket of the host that runs it.
+//! A unix socket through which a running robot is given another model.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -9,7 +9,7 @@ use loopsight_link::{Decoder, LONGEST, Reply, Request, encode};
 use super::LineError;
 use super::open::failed;
 
-/// A socket at which somebody may talk as to the robot itself. Nothing here waits.
+/// A socket that speaks the robot's protocol. No call here blocks.
 pub(super) struct Door {
     path: PathBuf,
     listener: UnixListener,
@@ -17,7 +17,7 @@ pub(super) struct Door {
 }
 
 impl Door {
-    /// Makes the socket. One that nobody listens at any more is replaced.
+    /// Makes the socket. A stale one, at which nobody listens, is replaced.
     pub(super) fn open(path: &str) -> Result<Self, LineError> {
         let io = |source| failed(path, source);
         let listener = match UnixListener::bind(path) {
@@ -41,7 +41,7 @@ impl Door {
         })
     }
 
-    /// What somebody asks for, if anybody does.
+    /// The next request of a client, if there is one.
     pub(super) fn asked(&mut self) -> Option<Request> {
         if self.visitor.is_none() {
             let (stream, _) = self.listener.accept().ok()?;
@@ -68,7 +68,7 @@ impl Door {
         }
     }
 
-    /// Answers who asked; who does not listen any more is let go.
+    /// Answers the client. One that has gone is dropped.
     pub(super) fn answer(&mut self, reply: &Reply) {
         let Some((stream, _)) = &mut self.visitor else {
             return;

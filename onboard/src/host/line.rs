@@ -8,7 +8,7 @@ use loopsight_link::{Decoder, LONGEST, Reason, Reply, Request, Unusable, encode}
 
 use super::open::{self, Stream};
 
-/// Why there is nothing to hear of a robot, or nothing good.
+/// Why a robot cannot be talked to.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LineError {
@@ -17,7 +17,7 @@ pub enum LineError {
     Missing {
         /// The line.
         line: String,
-        /// Serial ports that there are.
+        /// Serial ports of this machine.
         ports: Vec<String>,
     },
     /// The file may not be opened.
@@ -43,7 +43,7 @@ pub enum LineError {
         /// The line.
         line: String,
     },
-    /// A socket that nobody listens at.
+    /// Nobody listens at this socket.
     #[error("nobody listens at the socket `{line}`")]
     Nobody {
         /// The line.
@@ -65,7 +65,7 @@ pub enum LineError {
     NoAnswer {
         /// The line.
         line: String,
-        /// How long it was waited for, s.
+        /// How long the host waited, s.
         timeout_s: f64,
         /// Baud rate of a serial port.
         baud: Option<u32>,
@@ -125,7 +125,7 @@ pub enum LineError {
         /// The same, as the robot said it.
         unusable: Unusable,
     },
-    /// What the robot sent is not of the sizes that its plant has.
+    /// The robot sent another number of values than its plant has.
     #[error("the robot at `{line}` sent {found} {what}, expected {expected}")]
     Sizes {
         /// The line.
@@ -140,7 +140,7 @@ pub enum LineError {
 }
 
 impl LineError {
-    /// The reason for which a robot rests after this.
+    /// The robot's reason to be at rest, if it is.
     pub(super) fn reason(&self) -> Reason {
         match self {
             LineError::AtRest { reason } => *reason,
@@ -158,7 +158,7 @@ fn listed(ports: &[String]) -> String {
     }
 }
 
-/// A line, opened when something is first said.
+/// A line to a robot. It is opened when the first message is sent.
 pub struct Line {
     path: String,
     baud: u32,
@@ -210,7 +210,11 @@ impl Line {
         }
     }
 
-    /// Says something.
+    /// Sends a message.
+    ///
+    /// # Errors
+    ///
+    /// The line cannot be opened, or fails.
     pub fn say(&mut self, request: &Request) -> Result<(), LineError> {
         let mut bytes = [0; LONGEST];
         let path = self.path.clone();

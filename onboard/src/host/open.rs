@@ -1,4 +1,4 @@
-//! Opening what a path names: a serial port or a unix socket.
+//! Opens a serial port or a unix socket.
 
 use std::io::{self, ErrorKind, Read, Write};
 #[cfg(unix)]
@@ -9,9 +9,9 @@ use serialport::SerialPort;
 
 use super::LineError;
 
-/// Bytes both ways, each call within a time.
+/// Reads and writes bytes; each call ends within a time.
 pub(super) trait Stream: Read + Write + Send {
-    /// Baud rates mean something to it.
+    /// It has a baud rate.
     fn has_baud(&self) -> bool;
 }
 
@@ -64,7 +64,7 @@ fn socket(path: &str, timeout: Duration) -> Result<UnixStream, LineError> {
     Ok(stream)
 }
 
-/// What a system's error says of a line.
+/// An error of the system as an error of the line.
 pub(super) fn failed(path: &str, source: io::Error) -> LineError {
     let line = path.to_owned();
     match source.kind() {
@@ -79,7 +79,7 @@ pub(super) fn failed(path: &str, source: io::Error) -> LineError {
     }
 }
 
-/// What the serial port says when it is opened.
+/// An error on opening a serial port as an error of the line.
 fn refused(path: &str, error: serialport::Error) -> LineError {
     let line = path.to_owned();
     match error.kind {

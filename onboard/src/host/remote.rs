@@ -6,7 +6,7 @@ use super::LineError;
 use super::conversation::Conversation;
 use super::told::Told;
 
-/// Hands over what was measured and wanted, and takes the command.
+/// Sends measurement and reference to the robot, and takes its command.
 pub(super) struct Remote {
     robot: Conversation,
     /// The next step.
@@ -48,7 +48,7 @@ impl Remote {
     }
 }
 
-/// What a loop is told of an error of the line; the words are in [`Controller::remark`].
+/// An error of the line as an error of the controller. [`Controller::remark`] has the words.
 pub(super) fn kind(error: &LineError) -> ControlError {
     match error {
         LineError::AtRest { .. } | LineError::Refused { .. } => {
@@ -103,7 +103,7 @@ impl Controller<f64> for Remote {
 }
 
 impl Drop for Remote {
-    /// The robot is let go at the end of a run; one that does not hear it stops by its watchdog.
+    /// Stops the robot at the end of a run. If it does not hear that, its watchdog stops it.
     fn drop(&mut self) {
         let _ = self.robot.stop();
     }

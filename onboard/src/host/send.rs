@@ -1,4 +1,4 @@
-//! A loop file as a robot is told it, without running it.
+//! Sends a loop file's configuration to a robot without running the loop.
 
 use std::any::Any;
 
@@ -10,24 +10,24 @@ use loopsight_model::registry::BuildError;
 use super::conversation::Conversation;
 use super::{Aboard, Line, LineError, Serial};
 
-/// What a robot acknowledged.
+/// A robot's acknowledgement of its configuration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Acknowledged {
-    /// Where it was told.
+    /// The line that was used.
     pub line: String,
     /// Plant of its firmware.
     pub plant: String,
     /// Period of its firmware, s.
     pub period_s: f64,
-    /// It drives, and goes on with what it was told; otherwise it waits for its first step.
+    /// It is driving, and goes on with the new configuration. Otherwise it waits for its first step.
     pub runs: bool,
-    /// It was driving for somebody else, and came to rest by this.
+    /// It was driving for another host, and was stopped by this.
     pub interrupted: bool,
-    /// What it was told.
+    /// The configuration.
     pub configuration: Configuration,
 }
 
-/// Why a robot was not told.
+/// Why a robot was not configured.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SendError {
@@ -48,8 +48,12 @@ pub enum SendError {
     Line(#[from] LineError),
 }
 
-/// Tells the robot of a loop file its model, effects, learning, law and safety, at `line` or where the file
-/// says: at its `door` where a run has opened it, else at the robot's own line.
+/// Sends a loop file's model, effects, learning, law and safety to its robot: at `line`, or where the file says.
+/// That is the `door` if a run has opened it, else the robot's own line.
+///
+/// # Errors
+///
+/// See [`SendError`].
 pub fn send(file: &LoopFile, model: &Model, line: Option<&str>) -> Result<Acknowledged, SendError> {
     let controller: &dyn Any = file.controller.as_ref();
     let Some(aboard) = controller.downcast_ref::<Aboard>() else {

@@ -19,12 +19,12 @@ use super::remote::kind;
 use super::told::{Told, widen};
 use super::{Aboard, Line, LineError, baud, rate, timeout, waits};
 
-/// A robot with motors and encoders of its own, which runs its loop by its own timer: the host tells it what
-/// it is (`[controller.aboard]`) and where it should be, and hears what it measured and did.
+/// A robot with motors and encoders of its own, which runs its loop by its own timer. The host sends its
+/// configuration (`[controller.aboard]`) and its references, and hears what it measured and did.
 ///
-/// The readings keep the time: the loop ticks when the robot does. A reference is what the robot heard last,
-/// so it follows the file by one period; the log has what the robot followed. Ticks whose message was lost
-/// are there, with the values before and marked as not fresh.
+/// The robot keeps the time: the loop on the host ticks when a report of the robot arrives. The robot follows
+/// the reference that it heard last, one period later than the file has it; the log has what the robot
+/// followed. A tick whose report was lost is in the log with the values before it, marked as not fresh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Serial {
@@ -138,14 +138,14 @@ impl DriverPart for Serial {
 
 declare_part!(&META);
 
-/// What both halves of the loop know of the robot.
+/// The conversation, shared by the two halves of the loop.
 struct Talk {
     robot: Conversation,
     /// What the robot did in the present tick.
     act: Option<Act>,
 }
 
-fn held(talk: &Arc<Mutex<Talk>>) -> MutexGuard<'_, Talk> {
+fn locked(talk: &Arc<Mutex<Talk>>) -> MutexGuard<'_, Talk> {
     talk.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -156,14 +156,14 @@ struct Body {
     period: f64,
     /// The robot's next tick.
     tick: u32,
-    /// An act that came after others were lost.
+    /// An act that arrived early: those before it were lost.
     pending: Option<Act>,
     measured: Vec<f64>,
 }
 
 impl Body {
     fn next(&mut self) -> Result<bool, LineError> {
-        let mut talk = held(&self.talk);
+        let mut talk = locked(&self.talk);
         if self.tick == 0 && self.pending.is_none() {
             talk.robot.begin()?;
             // It begins where it should be at rest; the first reference is heard in its second tick.
@@ -214,15 +214,15 @@ impl Driver<f64> for Body {
         Ok(Sample { time, fresh })
     }
 
-    /// Nothing is written: the robot did what it says.
+    /// Nothing is written: the robot has driven its motors already.
     fn write(&mut self, _command: &[f64], applied: &mut [f64]) -> Result<(), HostDriverError> {
-        let talk = held(&self.talk);
+        let talk = locked(&self.talk);
         widen(applied, talk.act.as_ref().map_or(&[][..], |a| &a.command));
         Ok(())
     }
 
     fn safe_stop(&mut self) -> Result<(), HostDriverError> {
-        held(&self.talk).robot.stop().map_err(|e| lost(&e))
+        locked(&self.talk).robot.stop().map_err(|e| lost(&e))
     }
 }
 
@@ -244,7 +244,7 @@ impl Controller<f64> for Law {
         _model: &mut dyn AffineModel<f64>,
         command: &mut [f64],
     ) -> Result<Command, ControlError> {
-        let mut talk = held(&self.talk);
+        let mut talk = locked(&self.talk);
         let served = talk.robot.serve();
         let step = |talk: &mut Talk| talk.robot.step(tick.index as u32, 0, &[], reference);
         let said = served.and_then(|remark| step(&mut talk).map(|()| remark));
@@ -278,6 +278,6 @@ impl Controller<f64> for Law {
 
     /// A new session begins with the next reading.
     fn reset(&mut self) {
-        held(&self.talk).robot.renew();
+        locked(&self.talk).robot.renew();
     }
 }

@@ -1,10 +1,10 @@
-//! What a robot tells of itself beside its commands.
+//! What a robot reports beside its commands.
 
 use loopsight_core::{Command, Quantity};
 use loopsight_link::Act;
 use loopsight_model::model::Model;
 
-/// What the robot learned and, where it has sensors of its own, its supply.
+/// The parameters that the robot learned and, if it has sensors of its own, its supply.
 #[derive(Debug)]
 pub(super) struct Told {
     quantities: Vec<Quantity<f64>>,
@@ -40,7 +40,7 @@ impl Told {
         self
     }
 
-    /// Takes what the robot did in a tick: its command, and what it tells beside it.
+    /// Takes a robot's report of a tick: its command, and the values beside it.
     pub(super) fn take(&mut self, act: &Act, command: &mut [f64]) -> Command {
         widen(command, &act.command);
         let learned = self.learned.iter().map(|i| act.parameters.get(*i));
@@ -63,7 +63,7 @@ impl Told {
     }
 }
 
-/// A robot's single precision in the host's double.
+/// Copies a robot's `f32` values into the host's `f64`.
 pub(super) fn widen(to: &mut [f64], from: &[f32]) {
     for (to, from) in to.iter_mut().zip(from) {
         *to = f64::from(*from);

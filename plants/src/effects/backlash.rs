@@ -145,7 +145,7 @@ mod tests {
 
     use super::*;
 
-    /// A load that is held: drives with +`volts`, then from 10 ms on with -`volts`; returns what the
+    /// A load that is locked: drives with +`volts`, then from 10 ms on with -`volts`; returns what the
     /// teeth push with, and the effort that the effect adds, every 0.1 ms.
     fn reversal(play: f64, rotor: f64, volts: f64) -> Vec<[f64; 2]> {
         let p = [play, rotor, 800.0];

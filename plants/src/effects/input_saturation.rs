@@ -28,7 +28,7 @@ impl Effect for InputSaturation {
         summary: "the actuator gives no more than a limit",
         symptom: "small commands are right, large ones all give the same; the residual appears only above a certain command",
         remedy: "tell the controller the limit, so that it does not wind up; a higher supply or current limit",
-        equation: "u_effective = u held within ±limit",
+        equation: "u_effective = clamp(u, -limit, limit)",
         reference: "Hu, Lin (2001), Control Systems with Actuator Saturation, chapter 1",
         example: "[[effect]]\n[effect.input_saturation]\nat = [\"input.right\", \"input.left\"]\nlimit = 6.0\n",
         places: &[PlaceKind::Input],

@@ -7,7 +7,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 ///
 /// ```text
 /// F₀ = U + other efforts - T_w E'             E = V - U
-/// F  = (F₀ + (g T_w - 1) s) held within ±L(s)       w = F - F₀
+/// F  = clamp(F₀ + (g T_w - 1) s, -L(s), L(s))       w = F - F₀
 /// T_w s' = F₀ - F - s                         L(s) = limit (sliding + (1 - sliding)/(1 + |s|/fall))
 /// ```
 ///
@@ -31,7 +31,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 ///
 /// A tyre's force rises within a slip far below what is seen here, has its peak, and falls: past the
 /// peak of the Magic Formula the force comes near to that of sliding with the inverse of the slip, and
-/// so does `L`. A log without hard reversals does not show the fall: `sliding` is held at 0.87, the
+/// so does `L`. A log without hard reversals does not show the fall: `sliding` is frozen at 0.87, the
 /// middle of what Wong's table of road adhesion has from ice (0.70) to earth roads (0.96), and
 /// `fall` at 1 V, unless a file frees them.
 ///
@@ -56,7 +56,7 @@ impl Effect for WheelSlip {
         summary: "the ground takes no more than the traction limit; what exceeds it spins the wheel",
         symptom: "gentle starts are right, hard ones and reversals are too slow in the robot; the residual appears only where the acceleration is high",
         remedy: "limit the acceleration that is asked for; more weight on the driven wheels, softer tyres, a cleaner floor",
-        equation: "F0 = U + efforts - T E'; F = (F0 + (g T - 1) s) held within ±L(s); T s' = F0 - F - s; w = F - F0; L = limit (sliding + (1 - sliding)/(1 + |s|/fall))",
+        equation: "F0 = U + efforts - T E'; F = clamp(F0 + (g T - 1) s, -L(s), L(s)); T s' = F0 - F - s; w = F - F0; L = limit (sliding + (1 - sliding)/(1 + |s|/fall))",
         reference: "Wong (2008), Theory of Ground Vehicles, 4th ed., sections 1.3, 3.1; Pacejka (2012), Tire and Vehicle Dynamics, 3rd ed., section 4.3",
         example: "[[effect]]\n[effect.wheel_slip]\nat = [\"wheel.right\", \"wheel.left\"]\nlimit = 5.0\n",
         places: &[PlaceKind::Effort],
@@ -180,10 +180,14 @@ mod tests {
 
     #[test]
     fn what_exceeds_the_limit_spins_the_wheel() {
-        let held = |volts: f64| std::iter::repeat_n(volts, 2000);
-        assert!(driven(&P, held(5.5), -1.0).iter().all(|x| *x == [4.5, 0.0]));
+        let constant = |volts: f64| std::iter::repeat_n(volts, 2000);
+        assert!(
+            driven(&P, constant(5.5), -1.0)
+                .iter()
+                .all(|x| *x == [4.5, 0.0])
+        );
         for sign in [1.0, -1.0] {
-            let found = driven(&P, held(sign * 10.0), -sign);
+            let found = driven(&P, constant(sign * 10.0), -sign);
             assert_eq!(found[0][0], sign * 5.0);
             // It comes to the slip at which drive, back-emf of the slip and force balance.
             let [force, slip] = found[1999].map(|x| sign * x);

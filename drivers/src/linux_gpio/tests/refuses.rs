@@ -143,7 +143,7 @@ fn next_command(command: [f64; 2], spoil: impl FnOnce(&Fake)) -> (Fake, String) 
 #[test]
 fn what_fails_on_the_way_stops_the_motors_and_says_which_pin() {
     let (fake, said) = next_command([f64::NAN, 1.0], |_| ());
-    assert_eq!(said, "the command for motor 0 is no number");
+    assert_eq!(said, "the command for motor 0 is not a number");
     assert_eq!(fake.duties(), [0, 0]);
     let (fake, said) = next_command([-1.0, 1.0], |fake| {
         *fake.lines.broken.lock().unwrap() = Some(5)
