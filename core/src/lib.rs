@@ -51,7 +51,9 @@ pub use plant::{
 };
 pub use real::Real;
 pub use signal::Signal;
-pub use tick::{Loop, Observation, Observer, Step, Tick, TickError};
+#[doc(hidden)]
+pub use tick::TickRecord as Step;
+pub use tick::{Loop, Observation, Observer, Tick, TickError, TickRecord};
 
 /// What the macros need of this crate.
 #[doc(hidden)]

@@ -161,7 +161,7 @@ pub struct Loop<S, D, C, M, O, K, B, W = ()> {
 
 /// What one tick did; borrowed from the loop's buffers.
 #[derive(Clone, Copy, Debug)]
-pub struct Step<'a, S> {
+pub struct TickRecord<'a, S> {
     /// When.
     pub tick: Tick<S>,
     /// How old the measurement is.
@@ -284,7 +284,7 @@ where
     /// Waits for the next period, then reads, learns, judges and teaches, controls and writes.
     ///
     /// On any error the driver has been stopped safely when this returns.
-    pub fn tick(&mut self, reference: &[S]) -> Result<Step<'_, S>, TickError<D::Error, S>> {
+    pub fn tick(&mut self, reference: &[S]) -> Result<TickRecord<'_, S>, TickError<D::Error, S>> {
         self.tick_towards(reference, reference)
     }
 
@@ -295,7 +295,7 @@ where
         &mut self,
         reference: &[S],
         target: &[S],
-    ) -> Result<Step<'_, S>, TickError<D::Error, S>> {
+    ) -> Result<TickRecord<'_, S>, TickError<D::Error, S>> {
         if self.index == 0 {
             self.origin = self.clock.now();
         }
@@ -303,7 +303,7 @@ where
         self.clock.wait_until(due);
         let began = self.clock.now();
         match self.advance(reference, target) {
-            Ok((tick, sample, outcome, event)) => Ok(Step {
+            Ok((tick, sample, outcome, event)) => Ok(TickRecord {
                 late: began - due,
                 busy: self.clock.now() - began,
                 tick,

@@ -139,7 +139,7 @@ pub(crate) fn fit(
 /// An `rls` with `n` parameters, starting from zero, by way of the registry.
 fn estimator(n: usize) -> Result<Box<dyn Estimator<f64>>, FitError> {
     let source = "rls = { initial_covariance = 1e9 }";
-    let part: Box<dyn EstimatorPart> = loopsight_model::config::Source::parse("rls", source)
+    let part: Box<dyn EstimatorPart> = loopsight_model::config::TomlSource::parse("rls", source)
         .and_then(|s| s.read())
         .map_err(|_| FitError::NoEstimator("rls".to_owned()))?;
     Ok(part.build(&vec![0.0; n])?)

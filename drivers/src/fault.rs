@@ -216,7 +216,7 @@ fn misnamed(key: &str, what: &str, found: &str, ids: &[&str]) -> BuildError {
 
 #[cfg(test)]
 mod tests {
-    use loopsight_model::config::Source;
+    use loopsight_model::config::TomlSource;
 
     use super::*;
     use crate::fixture::{WHEEL, build, twil_encoders};
@@ -230,7 +230,7 @@ mod tests {
         struct File {
             fault: Vec<SensorFault>,
         }
-        let source = Source::parse("faults.toml", fault).unwrap();
+        let source = TomlSource::parse("faults.toml", fault).unwrap();
         let file = source.read::<File>().unwrap();
         let settings = Simulated {
             fault: file.fault,

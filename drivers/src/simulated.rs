@@ -319,7 +319,7 @@ impl Driver<f64> for SimulatedDriver {
 
 #[cfg(test)]
 mod tests {
-    use loopsight_model::config::Source;
+    use loopsight_model::config::TomlSource;
 
     use super::*;
     use crate::fixture::{build, instants, model, twil, twil_encoders, voltages};
@@ -340,7 +340,7 @@ mod tests {
 
     #[test]
     fn the_example_and_every_setting_are_read() {
-        let read = |text: &str| Source::parse("loop.toml", text).unwrap().read::<File>();
+        let read = |text: &str| TomlSource::parse("loop.toml", text).unwrap().read::<File>();
         assert_eq!(read(META.example).unwrap().driver.meta().id, "simulated");
         let all = "[driver.simulated]\nmodel = \"robot.toml\"\nstep_s = 1e-4\nseed = 3\n\
                    noise = { linear_velocity = 0.001 }\nlimit = { voltage_left = 12.0 }\nquantize = false\n\

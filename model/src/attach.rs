@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::config::{ConfigError, Source, Step, nearest};
+use crate::config::{ConfigError, PathSegment, TomlSource, nearest};
 use crate::model::{Attached, ModelParameter, signal_index, signals};
 use crate::registry::{EffectPart, ReadyEffect};
 use loopsight_core::{Channel, EffectMeta, PlantMeta, Role};
@@ -13,11 +13,12 @@ pub(crate) fn attach(
     part: &dyn EffectPart,
     index: usize,
     parameters: &mut Vec<ModelParameter>,
-    source: &Source,
+    source: &TomlSource,
 ) -> Result<Attached, Box<ConfigError>> {
     let meta = part.meta();
-    let base: Vec<Step> = vec!["effect".into(), index.into(), meta.id.into()];
-    let path = |more: &[Step]| -> Vec<Step> { base.iter().chain(more).cloned().collect() };
+    let base: Vec<PathSegment> = vec!["effect".into(), index.into(), meta.id.into()];
+    let path =
+        |more: &[PathSegment]| -> Vec<PathSegment> { base.iter().chain(more).cloned().collect() };
     if part.at().is_empty() {
         let fitting = fitting_channels(plant, meta);
         return Err(source.error(
@@ -71,7 +72,7 @@ pub(crate) fn bind(
     plant: &'static PlantMeta,
     ready: ReadyEffect,
     at: Vec<&'static Channel>,
-    base: &[Step],
+    base: &[PathSegment],
     parameters: &mut Vec<ModelParameter>,
 ) -> Attached {
     let meta = ready.meta;

@@ -65,30 +65,33 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
     })
 }
 
-/// A step in the path to a value.
+/// A segment of the path to a value: a key, or an index into an array.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Step {
+pub enum PathSegment {
     /// Key of a table.
     Key(String),
     /// Index into an array.
     Index(usize),
 }
 
-impl From<&str> for Step {
+impl From<&str> for PathSegment {
     fn from(key: &str) -> Self {
-        Step::Key(key.to_owned())
+        PathSegment::Key(key.to_owned())
     }
 }
 
-impl From<usize> for Step {
+impl From<usize> for PathSegment {
     fn from(index: usize) -> Self {
-        Step::Index(index)
+        PathSegment::Index(index)
     }
 }
 
-/// A TOML document that can say where its values stand.
+#[doc(hidden)]
+pub use {PathSegment as Step, TomlSource as Source};
+
+/// The text of a TOML file, which says where each of its values stands.
 #[derive(Debug)]
-pub struct Source {
+pub struct TomlSource {
     /// Name of the file.
     pub file: String,
     /// Its text.
@@ -96,7 +99,7 @@ pub struct Source {
     document: Document<String>,
 }
 
-impl Source {
+impl TomlSource {
     /// Parses the syntax of `text`.
     pub fn parse(file: &str, text: &str) -> Result<Self, Box<ConfigError>> {
         match Document::parse(text.to_owned()) {
@@ -135,15 +138,17 @@ impl Source {
             }
         };
         serde_path_to_error::deserialize(deserializer).map_err(|error| {
-            let path: Vec<Step> = error
+            let path: Vec<PathSegment> = error
                 .path()
                 .iter()
                 .filter_map(|segment| match segment {
-                    serde_path_to_error::Segment::Map { key } => Some(Step::Key(key.clone())),
-                    serde_path_to_error::Segment::Enum { variant } => {
-                        Some(Step::Key(variant.clone()))
+                    serde_path_to_error::Segment::Map { key } => {
+                        Some(PathSegment::Key(key.clone()))
                     }
-                    serde_path_to_error::Segment::Seq { index } => Some(Step::Index(*index)),
+                    serde_path_to_error::Segment::Enum { variant } => {
+                        Some(PathSegment::Key(variant.clone()))
+                    }
+                    serde_path_to_error::Segment::Seq { index } => Some(PathSegment::Index(*index)),
                     serde_path_to_error::Segment::Unknown => None,
                 })
                 .collect();
@@ -158,7 +163,7 @@ impl Source {
         let table = self.document.as_table();
         let roles = ["plant", "driver", "controller", "estimator"].map(|role| {
             let part = table.get(role).and_then(Item::as_table_like);
-            (vec![Step::from(role)], part)
+            (vec![PathSegment::from(role)], part)
         });
         let effects = table.get("effect").and_then(Item::as_array_of_tables);
         let effects = effects.into_iter().flatten().enumerate().map(|(i, t)| {
@@ -177,7 +182,12 @@ impl Source {
     }
 
     /// An error at `path`; the deepest part of it that the document has is pointed at.
-    pub fn error(&self, path: &[Step], message: &str, help: Option<String>) -> Box<ConfigError> {
+    pub fn error(
+        &self,
+        path: &[PathSegment],
+        message: &str,
+        help: Option<String>,
+    ) -> Box<ConfigError> {
         self.error_at(self.locate(path, false), message, help)
     }
 
@@ -197,14 +207,14 @@ impl Source {
     }
 
     /// Turns serde's words into an error with the nearest right name.
-    fn explain(&self, mut path: Vec<Step>, message: &str) -> Box<ConfigError> {
+    fn explain(&self, mut path: Vec<PathSegment>, message: &str) -> Box<ConfigError> {
         let names = quoted(message);
         let unknown = ["unknown field", "unknown variant"]
             .iter()
             .any(|w| message.starts_with(w));
         if unknown || message.starts_with("field ") {
             // Depending on where serde noticed, the path ends above the key or with it.
-            if let Some(name) = names.first().map(|n| Step::Key(n.clone()))
+            if let Some(name) = names.first().map(|n| PathSegment::Key(n.clone()))
                 && path.last() != Some(&name)
             {
                 path.push(name);
@@ -262,10 +272,10 @@ fn quoted(message: &str) -> Vec<String> {
         .collect()
 }
 
-fn unknown_text(path: &[Step], found: &str, expected: &[String]) -> String {
+fn unknown_text(path: &[PathSegment], found: &str, expected: &[String]) -> String {
     let place = match path {
         [] | [_] => String::new(),
-        [.., Step::Key(parent), _] => format!(" in `{parent}`"),
+        [.., PathSegment::Key(parent), _] => format!(" in `{parent}`"),
         _ => String::new(),
     };
     if expected.is_empty() {
@@ -311,7 +321,7 @@ mod tests {
 
     #[test]
     fn an_unknown_key_is_pointed_at_with_the_nearest_name() {
-        let source = Source::parse("m.toml", "# a comment\nmas = 3.0\n").unwrap();
+        let source = TomlSource::parse("m.toml", "# a comment\nmas = 3.0\n").unwrap();
         let error = source.read::<Thing>().unwrap_err();
         assert_eq!((error.line, error.column), (2, 1));
         assert_eq!(error.help.as_deref(), Some("did you mean `mass`?"));
@@ -319,7 +329,7 @@ mod tests {
 
     #[test]
     fn a_wrong_type_is_pointed_at() {
-        let source = Source::parse("m.toml", "mass = 1.0\nlist = [1.0, \"x\"]\n").unwrap();
+        let source = TomlSource::parse("m.toml", "mass = 1.0\nlist = [1.0, \"x\"]\n").unwrap();
         let error = source.read::<Thing>().unwrap_err();
         assert_eq!((error.line, error.column), (2, 14));
         assert!(error.message.contains("invalid type"), "{}", error.message);
@@ -327,7 +337,7 @@ mod tests {
 
     #[test]
     fn broken_syntax_is_pointed_at() {
-        let error = Source::parse("m.toml", "mass = \n").unwrap_err();
+        let error = TomlSource::parse("m.toml", "mass = \n").unwrap_err();
         assert_eq!(error.line, 1);
     }
 

@@ -25,7 +25,7 @@ mod tree;
 
 use std::ops::Range;
 
-use crate::config::{At, Mistake, Step};
+use crate::config::{At, Mistake, PathSegment};
 pub(crate) use described::{EFFECT_PART, PLANT_PART};
 pub use draft::{EffectDraft, ParameterDraft};
 use tree::Tree;
@@ -66,7 +66,7 @@ pub(crate) trait Names {
 }
 
 /// A mistake in the expression at `path` of a part's table.
-fn placed(path: &[Step], error: ExpressionError) -> Mistake {
+fn placed(path: &[PathSegment], error: ExpressionError) -> Mistake {
     let mut mistake = Mistake::value(path.iter().cloned(), error.message);
     mistake.at = At::Text(error.place);
     mistake.help = error.help;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::affine::{Affine, Treatment};
-use crate::config::{ConfigError, Source, Step};
+use crate::config::{ConfigError, PathSegment, TomlSource};
 use crate::excitation::{self, Excitation, Sequence};
 use crate::identification::{Identification, IdentificationError, LearningSettings};
 use crate::limits::{self, LimitSettings};
@@ -98,7 +98,7 @@ impl Composed {
     pub fn tick(
         &mut self,
         time: f64,
-    ) -> Result<loopsight_core::Step<'_, f64>, TickError<HostDriverError>> {
+    ) -> Result<loopsight_core::TickRecord<'_, f64>, TickError<HostDriverError>> {
         let ahead = self.host.model.ahead();
         for (i, sequence) in self.references.iter().enumerate() {
             self.now[i] = sequence.sample(time);
@@ -110,14 +110,14 @@ impl Composed {
 
 impl LoopFile {
     /// Reads a loop file.
-    pub fn parse(source: &Source) -> Result<Self, Box<ConfigError>> {
+    pub fn parse(source: &TomlSource) -> Result<Self, Box<ConfigError>> {
         source.read()
     }
 
     /// Composes the loop; errors are placed in `source`.
     pub fn compose(
         &self,
-        source: &Source,
+        source: &TomlSource,
         model: &Model,
         context: &DriverContext<'_>,
     ) -> Result<Composed, Box<ConfigError>> {
@@ -195,7 +195,7 @@ impl LoopFile {
             None => None,
             Some(part) => {
                 let settings = self.learning.clone().unwrap_or_default();
-                let path: [Step; 2] = ["estimator".into(), part.meta().id.into()];
+                let path: [PathSegment; 2] = ["estimator".into(), part.meta().id.into()];
                 Some(
                     Identification::new(
                         model,
@@ -272,14 +272,14 @@ impl LoopFile {
 }
 
 /// Places a part's error in the file: its key is a path within the part's table.
-pub fn placed(source: &Source, table: &[Step], error: BuildError) -> Box<ConfigError> {
+pub fn placed(source: &TomlSource, table: &[PathSegment], error: BuildError) -> Box<ConfigError> {
     let mut path = table.to_vec();
     path.extend(key_path(&error.key));
     source.error(&path, &error.message, error.help)
 }
 
 /// `voltage_left.sum[1].prbs` as steps.
-fn key_path(key: &str) -> Vec<Step> {
+fn key_path(key: &str) -> Vec<PathSegment> {
     let mut path = Vec::new();
     for piece in key.split('.').filter(|p| !p.is_empty()) {
         let mut rest = piece;
@@ -308,10 +308,10 @@ mod tests {
         assert_eq!(
             key_path("voltage_left.sum[1].prbs"),
             vec![
-                Step::from("voltage_left"),
-                Step::from("sum"),
-                Step::from(1),
-                Step::from("prbs")
+                PathSegment::from("voltage_left"),
+                PathSegment::from("sum"),
+                PathSegment::from(1),
+                PathSegment::from("prbs")
             ]
         );
         assert_eq!(key_path(""), vec![]);

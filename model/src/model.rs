@@ -13,7 +13,7 @@ use loopsight_core::{Derived, Parameter, Place, PlantMeta};
 
 use crate::attach::{attach, make_names_unique};
 pub use crate::attach::{misfit, unit_at};
-use crate::config::{ConfigError, Source, Step, nearest, read_text};
+use crate::config::{ConfigError, PathSegment, TomlSource, nearest, read_text};
 use crate::log_map::{ColumnMap, Hold, LogMap};
 pub use crate::pseudo_inverse::pseudo_inverse;
 use crate::registry::{AnyDynamics, HostReal};
@@ -59,23 +59,23 @@ impl std::fmt::Debug for Model {
 
 impl Model {
     /// Reads a model file.
-    pub fn load(path: &Path) -> Result<(Self, Source), ModelError> {
+    pub fn load(path: &Path) -> Result<(Self, TomlSource), ModelError> {
         let text = read_text(path)?;
         Self::from_toml(&path.display().to_string(), &text)
     }
 
     /// Composes a model from TOML; `file` names it in messages.
-    pub fn from_toml(file: &str, text: &str) -> Result<(Self, Source), ModelError> {
+    pub fn from_toml(file: &str, text: &str) -> Result<(Self, TomlSource), ModelError> {
         crate::registry::check()?;
-        let source = Source::parse(file, text)?;
+        let source = TomlSource::parse(file, text)?;
         let parsed: ModelFile = source.read()?;
         let model = Self::compose(&parsed, &source)?;
         Ok((model, source))
     }
 
     /// Composes a model from a parsed file; `source` places the errors.
-    pub fn compose(file: &ModelFile, source: &Source) -> Result<Self, Box<ConfigError>> {
-        let prefix: [Step; 2] = ["plant".into(), file.plant.meta().id.into()];
+    pub fn compose(file: &ModelFile, source: &TomlSource) -> Result<Self, Box<ConfigError>> {
+        let prefix: [PathSegment; 2] = ["plant".into(), file.plant.meta().id.into()];
         let ready = file
             .plant
             .ready()
@@ -317,7 +317,7 @@ impl Model {
 fn check_inputs(
     plant: &'static PlantMeta,
     log: &LogMap,
-    source: &Source,
+    source: &TomlSource,
 ) -> Result<(), Box<ConfigError>> {
     for id in log.inputs.keys() {
         if !plant.inputs.iter().any(|s| s.id == id) {

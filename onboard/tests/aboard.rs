@@ -12,7 +12,7 @@ use std::thread::JoinHandle;
 use desk::Desk;
 use loopsight_core::{ControlError, TickError};
 use loopsight_drivers as _;
-use loopsight_model::config::Source;
+use loopsight_model::config::TomlSource;
 use loopsight_model::loop_file::{Composed, LoopFile};
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, DriverContext};
@@ -41,7 +41,7 @@ fn compose(
         .filter(|line| !line.starts_with("door"))
         .collect();
     let text = change(text.replace("/tmp/twil.line", &socket.display().to_string()));
-    let source = Source::parse("loop.toml", &text).map_err(|e| e.to_string())?;
+    let source = TomlSource::parse("loop.toml", &text).map_err(|e| e.to_string())?;
     let file = LoopFile::parse(&source).map_err(|e| e.to_string())?;
     let load = |name: &str| Model::load(&folder().join(name)).unwrap().0;
     let model = load(model);

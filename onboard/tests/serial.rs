@@ -13,7 +13,7 @@ use loopsight_controllers as _;
 use loopsight_core::TickError;
 use loopsight_drivers as _;
 use loopsight_link::{Decoder, Hello, LONGEST, Reply, Request, Welcome, encode};
-use loopsight_model::config::Source;
+use loopsight_model::config::TomlSource;
 use loopsight_model::loop_file::{Composed, LoopFile};
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, DriverContext};
@@ -42,7 +42,7 @@ const TOLD: [&str; 7] = ["K_A", "K_B", "K_C", "K_D", "K_E", "K_F", "supply"];
 fn composed(line: &Path, text: &str) -> Result<Composed, String> {
     let text = text.replace('@', &line.display().to_string());
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/twil-firmware");
-    let source = Source::parse("loop.toml", &text).map_err(|e| e.to_string())?;
+    let source = TomlSource::parse("loop.toml", &text).map_err(|e| e.to_string())?;
     let file = LoopFile::parse(&source).map_err(|e| e.to_string())?;
     let load = |name: &str| Model::load(&folder.join(name)).unwrap().0;
     let model = load(&file.model);

@@ -37,7 +37,7 @@ pub use csv_read::read_csv_from;
 pub use csv_write::{LogWriter, column, header, write_csv};
 pub use error::{Location, RecordingError};
 pub use fault::{Fault, FaultKind, Severity};
-pub use map::{MeasuredSignal, Recording, map};
+pub use map::{MappedSignal, Recording, map};
 pub use source::{Source, read, read_bytes};
 pub use sysid::{SysIdLog, SysIdRun, TestKind, read_sysid};
 pub use table::{ColumnName, Table, TableRun};

@@ -28,14 +28,14 @@ pub struct Recording {
     /// Uninterrupted runs; the time of each begins at 0.
     pub runs: Vec<Run>,
     /// What the columns of [`Run::measured`] are.
-    pub measured: Vec<MeasuredSignal>,
+    pub measured: Vec<MappedSignal>,
     /// What is wrong with the log, the worst first.
     pub faults: Vec<Fault>,
 }
 
 /// A signal of the model for which the log has a column.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct MeasuredSignal {
+pub struct MappedSignal {
     /// Id of the signal.
     pub id: String,
     /// Its SI unit.

@@ -6,7 +6,7 @@ use loopsight_model::log_map::LogMap;
 
 use crate::error::{RecordingError, nearest};
 use crate::fault::{Fault, FaultKind};
-use crate::map::MeasuredSignal;
+use crate::map::MappedSignal;
 use crate::table::Table;
 
 /// A column and the factor to the SI unit of its signal.
@@ -23,7 +23,7 @@ pub(crate) struct Plan {
     pub(crate) run: Option<usize>,
     /// Inputs with their columns; none for one that is optional and not logged.
     pub(crate) inputs: Vec<(Option<Link>, String)>,
-    pub(crate) measured: Vec<(Link, MeasuredSignal)>,
+    pub(crate) measured: Vec<(Link, MappedSignal)>,
     pub(crate) notes: Vec<Fault>,
 }
 
@@ -96,7 +96,7 @@ impl Plan {
                 scale_unit: m.scale_unit.as_deref(),
             });
             let link = finder.signal("the measured signal", signal, wish)?;
-            let measured_signal = MeasuredSignal {
+            let measured_signal = MappedSignal {
                 id: signal.id.to_owned(),
                 unit: signal.unit.to_owned(),
                 sensor: entry.map(|m| m.sensor.clone()).unwrap_or_default(),

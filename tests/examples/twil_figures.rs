@@ -14,7 +14,7 @@ use loopsight::{CompareOptions, Log, Session};
 use loopsight_controllers as _;
 use loopsight_drivers::{Limit, Simulated};
 use loopsight_estimators as _;
-use loopsight_model::config::{Source, read_text};
+use loopsight_model::config::{TomlSource, read_text};
 use loopsight_model::loop_file::LoopFile;
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, DriverContext, DriverPart};
@@ -207,7 +207,7 @@ struct Driven {
 /// Runs a loop file to its end; `robot` takes the place of its driver.
 fn drive(path: &Path, robot: Option<Box<dyn DriverPart>>) -> Outcome<Driven> {
     let text = read_text(path)?;
-    let source = Source::parse(&path.display().to_string(), &text)?;
+    let source = TomlSource::parse(&path.display().to_string(), &text)?;
     let mut file = LoopFile::parse(&source)?;
     if let Some(robot) = robot {
         file.driver = robot;

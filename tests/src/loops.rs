@@ -1,6 +1,6 @@
 //! Loops composed from text, around robots that are nowhere in a file.
 
-use loopsight_model::config::{ConfigError, Source};
+use loopsight_model::config::{ConfigError, TomlSource};
 use loopsight_model::loop_file::{Composed, LoopFile};
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, DriverContext};
@@ -19,7 +19,7 @@ pub const GAINS: [(f64, f64); 6] = [
 
 /// The loop `text` around `model`; the driver's model file, whatever its name, is `robot`.
 pub fn composed(text: &str, model: &Model, robot: &str) -> Result<Composed, Box<ConfigError>> {
-    let source = Source::parse("loop.toml", text)?;
+    let source = TomlSource::parse("loop.toml", text)?;
     LoopFile::parse(&source)?.compose(
         &source,
         model,

@@ -8,7 +8,7 @@
 use loopsight_controllers::{PiResponse, settling_time};
 use loopsight_core::{Controller, Driver, DriverFault, Loop, Rk4, Sample, SimulatedClock};
 use loopsight_model::affine::Affine;
-use loopsight_model::config::Source;
+use loopsight_model::config::TomlSource;
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, ControllerPart};
 use loopsight_plants as _;
@@ -127,7 +127,7 @@ fn model(text: &str) -> Model {
 
 fn part(settings: &str) -> Box<dyn ControllerPart> {
     let text = format!("[controller.feedback_linearizing_pi]\n{settings}\n");
-    let source = Source::parse("loop.toml", &text).unwrap();
+    let source = TomlSource::parse("loop.toml", &text).unwrap();
     source.read::<File>().unwrap().controller
 }
 

@@ -11,7 +11,6 @@ use loopsight::{DiagnoseOptions, Log, Session};
 use loopsight_diagnosis::{Conclusion, Diagnosis, Measurements, Work, diagnose};
 use loopsight_hidden::{Experiment, Hidden, Recording, record_with};
 use loopsight_model::model::Model;
-use loopsight_model::run::Run;
 use loopsight_plants as _;
 use loopsight_tests::real_data;
 

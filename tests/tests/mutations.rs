@@ -8,7 +8,7 @@
 
 use loopsight::{CompareOptions, FitOptions, Log, Method, Session};
 use loopsight_diagnosis::{Measurements, Work, compare};
-use loopsight_model::config::Source;
+use loopsight_model::config::TomlSource;
 use loopsight_model::loop_file::LoopFile;
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, DriverContext, parts, plants};
@@ -174,7 +174,7 @@ fn damaged_loops_never_panic() {
         |_: &str, model: &Model| -> Result<Vec<Run>, BuildError> { Ok(vec![short_run(model)]) };
     for (seed, text) in texts.iter().enumerate() {
         let read = survivors(text, 100 + seed as u64, 300, |text| {
-            let Ok(source) = Source::parse("damaged.toml", text) else {
+            let Ok(source) = TomlSource::parse("damaged.toml", text) else {
                 return false;
             };
             let Ok(file) = LoopFile::parse(&source) else {

@@ -12,7 +12,7 @@
 
 use loopsight_core::{Estimator, Real};
 use loopsight_estimators::{Rls, RlsSettings};
-use loopsight_model::config::Source;
+use loopsight_model::config::TomlSource;
 use loopsight_model::registry::{ControllerPart, EstimatorPart};
 use nalgebra::{DVector, SVector};
 use proptest::prelude::*;
@@ -359,7 +359,7 @@ fn parts_survive_a_round_trip_through_toml() {
     ];
     for (estimator, controller) in every_key {
         let read = |text: &str| {
-            Source::parse("loop.toml", text)
+            TomlSource::parse("loop.toml", text)
                 .unwrap()
                 .read::<File>()
                 .unwrap()
@@ -377,13 +377,19 @@ fn parts_survive_a_round_trip_through_toml() {
 fn the_examples_of_the_declarations_build() {
     let estimator = "[estimator.rls]\nforgetting = 0.0\n";
     let text = format!("{estimator}\n[controller.feedback_linearizing_pi]\nsettling_time_s = 1\n");
-    let file: File = Source::parse("loop.toml", &text).unwrap().read().unwrap();
+    let file: File = TomlSource::parse("loop.toml", &text)
+        .unwrap()
+        .read()
+        .unwrap();
     let text = format!(
         "{}\n{}",
         file.estimator.meta().example,
         file.controller.meta().example
     );
-    let example: File = Source::parse("loop.toml", &text).unwrap().read().unwrap();
+    let example: File = TomlSource::parse("loop.toml", &text)
+        .unwrap()
+        .read()
+        .unwrap();
     assert!(example.estimator.build(&[0.0; 3]).is_ok());
     let refused = file.estimator.build(&[0.0; 3]).err().unwrap();
     assert_eq!(refused.key, "forgetting");
@@ -399,14 +405,14 @@ fn the_examples_of_the_declarations_build() {
 #[test]
 fn a_misspelt_key_is_pointed_at() {
     let text = "[controller.feedback_linearizing_pi]\nsettling_time_s = 1\n\n[estimator.rls]\nforgeting = 0.99\n";
-    let error = Source::parse("loop.toml", text)
+    let error = TomlSource::parse("loop.toml", text)
         .unwrap()
         .read::<File>()
         .unwrap_err();
     assert_eq!(error.line, 5, "{error}");
     assert_eq!(error.help.as_deref(), Some("did you mean `forgetting`?"));
     let text = "[estimator.rls]\n\n[controller.feedback_linearizing_pi]\nlimit = \"12 V\"\n";
-    let error = Source::parse("loop.toml", text)
+    let error = TomlSource::parse("loop.toml", text)
         .unwrap()
         .read::<File>()
         .unwrap_err();

@@ -15,7 +15,7 @@ fn read(name: &str) -> String {
 /// Root mean squares of the errors over the whole of a loop, and over its last half.
 fn errors(name: &str) -> [[f64; 2]; 2] {
     let text = read(name);
-    let source = Source::parse(name, &text).unwrap();
+    let source = TomlSource::parse(name, &text).unwrap();
     let file = LoopFile::parse(&source).unwrap();
     let ticks = (file.duration_s.unwrap() / file.period_s).round() as usize;
     let believed = model(&read(&file.model));

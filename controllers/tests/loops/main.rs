@@ -14,7 +14,7 @@ mod truth;
 use loopsight_controllers as _;
 use loopsight_drivers as _;
 use loopsight_estimators as _;
-use loopsight_model::config::Source;
+use loopsight_model::config::TomlSource;
 use loopsight_model::loop_file::{Composed, LoopFile};
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, DriverContext};
@@ -56,7 +56,7 @@ pub(crate) fn effect(text: &str) -> String {
 
 /// The loop `text` around `model`; the driver's `robot.toml` is `robot`.
 pub(crate) fn compose(text: &str, model: &Model, robot: &Model) -> Composed {
-    let source = Source::parse("loop.toml", text).unwrap();
+    let source = TomlSource::parse("loop.toml", text).unwrap();
     let file = LoopFile::parse(&source).unwrap();
     let load_model = |_: &str| Ok(robot.clone());
     let load_runs = |name: &str, _: &Model| Err(BuildError::at("recording", name));

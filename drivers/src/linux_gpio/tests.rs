@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 
 use embedded_hal::digital::{ErrorKind, ErrorType, OutputPin, PinState};
 use loopsight_core::{Clock, Driver as _, DriverFault};
-use loopsight_model::config::Source;
+use loopsight_model::config::TomlSource;
 use loopsight_model::model::Model;
 use loopsight_model::registry::BuildError;
 use tempfile::TempDir;
@@ -200,7 +200,7 @@ struct Only {
 }
 
 fn example() -> LinuxGpio {
-    let source = Source::parse("loop.toml", META.example).unwrap();
+    let source = TomlSource::parse("loop.toml", META.example).unwrap();
     source.read::<File>().unwrap().driver.linux_gpio
 }
 

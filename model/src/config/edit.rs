@@ -2,12 +2,12 @@
 
 use toml_edit::Item;
 
-use super::{Source, Step};
+use super::{PathSegment, TomlSource};
 
-impl Source {
+impl TomlSource {
     /// The text with numbers replaced or added at the paths given; everything else, comments
     /// included, stays as it was written.
-    pub fn with_values(&self, values: &[(Vec<Step>, f64)]) -> String {
+    pub fn with_values(&self, values: &[(Vec<PathSegment>, f64)]) -> String {
         let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
             return self.text.clone();
         };
@@ -61,10 +61,10 @@ impl Source {
 }
 
 /// Sets the number at `path` below `item`, keeping what stands around it.
-fn set_value(item: &mut Item, path: &[Step], value: f64) {
+fn set_value(item: &mut Item, path: &[PathSegment], value: f64) {
     match path {
         [] => {}
-        [Step::Key(key)] => {
+        [PathSegment::Key(key)] => {
             let is_new = item.get(key).is_none();
             if let Some(inline) = item.as_inline_table_mut().filter(|_| is_new)
                 && let Some((_, last)) = inline.iter_mut().last()
@@ -81,17 +81,17 @@ fn set_value(item: &mut Item, path: &[Step], value: f64) {
             }
             table.insert(key, Item::Value(new));
         }
-        [Step::Key(key), rest @ ..] => {
+        [PathSegment::Key(key), rest @ ..] => {
             let next = item.as_table_like_mut().and_then(|t| t.get_mut(key));
             if let Some(next) = next {
                 set_value(next, rest, value);
             }
         }
-        [Step::Index(index), rest @ ..] => {
+        [PathSegment::Index(index), rest @ ..] => {
             let table = item
                 .as_array_of_tables_mut()
                 .and_then(|a| a.get_mut(*index));
-            let [Step::Key(part), rest @ ..] = rest else {
+            let [PathSegment::Key(part), rest @ ..] = rest else {
                 return;
             };
             if let Some(next) = table.and_then(|t| t.get_mut(part)) {
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn values_are_replaced_and_comments_kept() {
         let text = "# robot\n[plant.a]\nk = 1.0 # first\n\n[[effect]]\n[effect.b]\nat = [\"x\"]\n";
-        let source = Source::parse("m.toml", text).unwrap();
+        let source = TomlSource::parse("m.toml", text).unwrap();
         let new = source.with_values(&[
             (vec!["plant".into(), "a".into(), "k".into()], -2.5),
             (

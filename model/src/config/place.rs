@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use toml_edit::Item;
 
-use super::{ConfigError, Source, Step};
+use super::{ConfigError, PathSegment, TomlSource};
 
 /// A mistake in the table of a part, which knows its own keys and not the file they stand in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mistake {
     /// Path of keys from the part's table.
-    pub path: Vec<Step>,
+    pub path: Vec<PathSegment>,
     /// What of it is wrong.
     pub at: At,
     /// What was expected and what was found.
@@ -32,7 +32,7 @@ pub enum At {
 
 impl Mistake {
     /// A wrong value.
-    pub fn value(path: impl IntoIterator<Item = Step>, message: impl Into<String>) -> Self {
+    pub fn value(path: impl IntoIterator<Item = PathSegment>, message: impl Into<String>) -> Self {
         Self {
             path: path.into_iter().collect(),
             at: At::Value,
@@ -42,7 +42,7 @@ impl Mistake {
     }
 
     /// A wrong key.
-    pub fn key(path: impl IntoIterator<Item = Step>, message: impl Into<String>) -> Self {
+    pub fn key(path: impl IntoIterator<Item = PathSegment>, message: impl Into<String>) -> Self {
         Self {
             at: At::Key,
             ..Self::value(path, message)
@@ -57,10 +57,10 @@ impl Mistake {
     }
 }
 
-impl Source {
+impl TomlSource {
     /// Places a mistake in the table of a part, which stands at `table`.
-    pub fn mistake(&self, table: &[Step], mistake: Mistake) -> Box<ConfigError> {
-        let path: Vec<Step> = table.iter().chain(&mistake.path).cloned().collect();
+    pub fn mistake(&self, table: &[PathSegment], mistake: Mistake) -> Box<ConfigError> {
+        let path: Vec<PathSegment> = table.iter().chain(&mistake.path).cloned().collect();
         let span = match mistake.at {
             At::Value => self.locate(&path, false),
             At::Key => self.locate(&path, true),
@@ -72,7 +72,7 @@ impl Source {
     }
 
     /// Where a piece of the string at `path` stands; nothing for a string with escapes.
-    fn within(&self, path: &[Step], piece: Range<usize>) -> Option<Range<usize>> {
+    fn within(&self, path: &[PathSegment], piece: Range<usize>) -> Option<Range<usize>> {
         let mut node = Node::Table(self.document.as_table());
         let mut span = None;
         let mut text = None;
@@ -88,7 +88,7 @@ impl Source {
 
     /// Where the value at `path`, or the deepest known part of it, stands; with `key`, where the
     /// last key of the path stands.
-    pub(super) fn locate(&self, path: &[Step], key: bool) -> Range<usize> {
+    pub(super) fn locate(&self, path: &[PathSegment], key: bool) -> Range<usize> {
         let mut span = 0..line_end(&self.text, 0);
         let mut node = Node::Table(self.document.as_table());
         for (depth, step) in path.iter().enumerate() {
@@ -122,9 +122,9 @@ enum Node<'a> {
 type Found<'a> = (Node<'a>, Option<Range<usize>>, Option<Range<usize>>);
 
 impl<'a> Node<'a> {
-    fn step(&self, step: &Step) -> Option<Found<'a>> {
+    fn step(&self, step: &PathSegment) -> Option<Found<'a>> {
         match (self, step) {
-            (Node::Table(table), Step::Key(key)) => {
+            (Node::Table(table), PathSegment::Key(key)) => {
                 let (found, item) = table.get_key_value(key)?;
                 let node = match item {
                     Item::Table(table) => Node::Table(table),
@@ -134,11 +134,11 @@ impl<'a> Node<'a> {
                 };
                 Some((node, found.span(), item.span()))
             }
-            (Node::Array(array), Step::Index(index)) => {
+            (Node::Array(array), PathSegment::Index(index)) => {
                 let value = array.get(*index)?;
                 Some((Node::of(value), value.span(), value.span()))
             }
-            (Node::Tables(tables), Step::Index(index)) => {
+            (Node::Tables(tables), PathSegment::Index(index)) => {
                 let table = tables.get(*index)?;
                 Some((Node::Table(table), table.span(), table.span()))
             }

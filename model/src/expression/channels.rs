@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::keep;
 use super::plant::PlantTable;
 use super::table::check_unit;
-use crate::config::{Mistake, Step, nearest};
+use crate::config::{Mistake, PathSegment, nearest};
 use loopsight_core::{Channel, Place, Reads, Role};
 
 /// A channel of the model file: an effort, or one at an input, the rate of a state or an output.
@@ -81,7 +81,7 @@ impl ChannelTable {
     }
 }
 
-fn path(id: &str, key: &str) -> [Step; 3] {
+fn path(id: &str, key: &str) -> [PathSegment; 3] {
     ["channels".into(), id.into(), key.into()]
 }
 

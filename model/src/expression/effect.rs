@@ -12,7 +12,7 @@ use super::table::{Ordered, ParameterTable, check_name, check_unit, check_used};
 use super::tree::Tree;
 use crate::Dual;
 use crate::attach::unit_at;
-use crate::config::{Mistake, Step};
+use crate::config::{Mistake, PathSegment};
 use crate::model::signals;
 use crate::registry::{AnyPhysics, EffectPart, ReadyEffect, Values, effects};
 use loopsight_core::{
@@ -117,7 +117,7 @@ impl EffectTable {
             at,
             parameters: &self.parameters,
         };
-        let force: [Step; 1] = ["force".into()];
+        let force: [PathSegment; 1] = ["force".into()];
         let tree = parse(&self.force, &names).map_err(|e| placed(&force, e))?;
         check_used(
             "parameters",
@@ -193,7 +193,7 @@ impl EffectTable {
             return Err(Mistake::key(["on".into()], message));
         }
         if let Some(name) = &self.name {
-            let path: [Step; 1] = ["name".into()];
+            let path: [PathSegment; 1] = ["name".into()];
             if !super::lexer::is_name(name) {
                 let message = format!("`{name}` is no name, expected letters, digits and `_`");
                 return Err(Mistake::value(path, message));

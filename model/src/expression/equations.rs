@@ -9,7 +9,7 @@ use super::table::{Ordered, check_used};
 use super::tree::{Slot, Tree};
 use super::{ExpressionError, Names, placed};
 use crate::Dual;
-use crate::config::{Mistake, Step};
+use crate::config::{Mistake, PathSegment};
 use loopsight_core::{Dynamics, Real, rk4_step};
 
 const PARAMETERS: u8 = FIRST_BANK;
@@ -95,7 +95,7 @@ impl Equations {
                 let names = InPlant { plant, rate };
                 let tree = parse(text.as_deref().unwrap_or(""), &names);
                 trees.push(tree.map_err(|e| {
-                    let path: [Step; 3] = [table.into(), id.into(), key.into()];
+                    let path: [PathSegment; 3] = [table.into(), id.into(), key.into()];
                     placed(&path, e)
                 })?);
             }
@@ -110,7 +110,7 @@ impl Equations {
         let outputs: Vec<Tree> = outputs.into_iter().flatten().collect();
         let mut rates = Vec::new();
         for (tree, id) in written.iter().zip(plant.states.ids()) {
-            let path: [Step; 3] = ["states".into(), id.into(), "rate".into()];
+            let path: [PathSegment; 3] = ["states".into(), id.into(), "rate".into()];
             rates.push(without_outputs(tree, &outputs, &path)?);
         }
         let equations = Self {
@@ -172,7 +172,7 @@ impl Equations {
                         "there is no signal `{rate}`, expected one of {}",
                         all.join(", ")
                     );
-                    let path: [Step; 3] = [table.into(), id.into(), "integral_of".into()];
+                    let path: [PathSegment; 3] = [table.into(), id.into(), "integral_of".into()];
                     return Err(Mistake::value(path, message));
                 };
                 found.push((rate, id));
@@ -240,7 +240,7 @@ fn put_in(
             needed.push(usize::from(slot.index));
         }
     });
-    let place: [Step; 3] = ["outputs".into(), id(index).into(), "value".into()];
+    let place: [PathSegment; 3] = ["outputs".into(), id(index).into(), "value".into()];
     for other in needed {
         if let Some(first) = path.iter().position(|p| *p == other) {
             let round = path[first..].iter().chain([&other]).map(|i| id(*i));
@@ -259,7 +259,7 @@ fn put_in(
 }
 
 /// An expression with the outputs it names put in their places.
-fn without_outputs(tree: &Tree, outputs: &[Tree], path: &[Step]) -> Result<Tree, Mistake> {
+fn without_outputs(tree: &Tree, outputs: &[Tree], path: &[PathSegment]) -> Result<Tree, Mistake> {
     let mut size = tree.size();
     tree.for_each_name(&mut |slot| {
         if slot.bank == OUTPUTS {

@@ -7,7 +7,7 @@ use super::described::PLANT_PART;
 use super::equations::{Equations, Law};
 use super::keep::{self, Kept};
 use super::table::{Ordered, ParameterTable, check_name, check_unit};
-use crate::config::{Mistake, Step, nearest};
+use crate::config::{Mistake, PathSegment, nearest};
 use crate::registry::{AnyDynamics, PlantPart, ReadyPlant, Values};
 use loopsight_core::{Channel, Dynamics, Parameter, Place, PlantMeta, Real, Signal};
 
@@ -122,7 +122,8 @@ impl PlantTable {
     fn check_signals(&self) -> Result<(), Mistake> {
         for (table, group) in self.groups() {
             for (id, signal) in group.iter() {
-                let path = |key: &str| -> [Step; 3] { [table.into(), id.into(), key.into()] };
+                let path =
+                    |key: &str| -> [PathSegment; 3] { [table.into(), id.into(), key.into()] };
                 check_unit(&path("unit"), &signal.unit, &signal.unit)?;
                 let keys = [
                     ("rate", signal.rate.is_some(), table == "states"),
@@ -223,7 +224,7 @@ impl PlantTable {
             }
         }
         for (i, id) in self.controlled.iter().enumerate() {
-            let path: [Step; 2] = ["controlled".into(), i.into()];
+            let path: [PathSegment; 2] = ["controlled".into(), i.into()];
             let Some(state) = self.states.position(id) else {
                 let all: Vec<&str> = self.states.ids().collect();
                 let message = format!(

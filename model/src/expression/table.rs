@@ -12,7 +12,7 @@ use super::keep;
 use super::lexer::is_name;
 use super::operation::{constant, function};
 use super::tree::{Slot, Tree};
-use crate::config::{Mistake, Step};
+use crate::config::{Mistake, PathSegment};
 use crate::registry::{Values, range_text};
 use loopsight_core::{Parameter, unit};
 
@@ -158,8 +158,8 @@ impl Ordered<ParameterTable> {
 
 impl ParameterTable {
     /// Its value and where that stands.
-    pub(crate) fn given(&self, id: &str) -> (Option<f64>, Vec<Step>) {
-        let path = |more: &[Step]| [&[PARAMETERS.into(), id.into()], more].concat();
+    pub(crate) fn given(&self, id: &str) -> (Option<f64>, Vec<PathSegment>) {
+        let path = |more: &[PathSegment]| [&[PARAMETERS.into(), id.into()], more].concat();
         match self {
             ParameterTable::Number(value) => (Some(*value), path(&[])),
             ParameterTable::Table(keys) => (keys.value, path(&["value".into()])),
@@ -279,7 +279,7 @@ pub(crate) fn check_name(table: &str, id: &str, taken: Option<&str>) -> Result<(
 }
 
 /// Checks a unit that stands at `path`.
-pub(crate) fn check_unit(path: &[Step], text: &str, written: &str) -> Result<(), Mistake> {
+pub(crate) fn check_unit(path: &[PathSegment], text: &str, written: &str) -> Result<(), Mistake> {
     unit::parse(text).map(drop).map_err(|error| {
         let piece = error.piece(text);
         let why = error.to_string();

@@ -4,7 +4,7 @@ use loopsight_core::Channel;
 
 use super::{Attached, Model, ModelParameter};
 use crate::attach::{bind, make_names_unique, misfit};
-use crate::config::Step;
+use crate::config::PathSegment;
 use crate::registry;
 
 impl Model {
@@ -22,7 +22,7 @@ impl Model {
             return None;
         }
         let mut model = self.clone();
-        let base: [Step; 3] = [
+        let base: [PathSegment; 3] = [
             "effect".into(),
             model.effects.len().into(),
             ready.meta.id.into(),

@@ -2,7 +2,7 @@
 
 use loopsight_core::Parameter;
 
-use crate::config::Step;
+use crate::config::PathSegment;
 
 /// A parameter of a composed model.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub struct ModelParameter {
     /// of a plant, for those of an effect see [`loopsight_core::Channel::size`].
     pub size: f64,
     /// Where it stands in the file.
-    pub path: Vec<Step>,
+    pub path: Vec<PathSegment>,
 }
 
 impl ModelParameter {

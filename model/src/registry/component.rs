@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use loopsight_core::{Channel, EffectMeta, PlantMeta};
 
 use super::scalar::{AnyDynamics, AnyPhysics};
-use crate::config::{Mistake, Step};
+use crate::config::{Mistake, PathSegment};
 use crate::values::Values;
 
 /// What [`declare_plant!`](crate::declare_plant) knows of a plant.
@@ -58,7 +58,7 @@ pub struct ReadyPlant {
     /// The parameters the file gives.
     pub values: Values,
     /// Where each of them stands in the plant's table.
-    pub paths: Vec<Vec<Step>>,
+    pub paths: Vec<Vec<PathSegment>>,
 }
 
 /// An effect as it stands in a model file: `[effect.<id>]` in an `[[effect]]`.
@@ -108,7 +108,7 @@ pub struct ReadyEffect {
     /// The parameters the file gives.
     pub given: Vec<Option<f64>>,
     /// Where each of them stands in the effect's table.
-    pub paths: Vec<Vec<Step>>,
+    pub paths: Vec<Vec<PathSegment>>,
     /// Signals it reads beside those that play roles, by index among states, inputs and outputs.
     pub signals: Vec<usize>,
 }

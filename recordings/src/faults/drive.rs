@@ -3,7 +3,7 @@
 use loopsight_core::unit::parse;
 use loopsight_model::run::Run;
 
-use crate::map::MeasuredSignal;
+use crate::map::MappedSignal;
 
 /// Combination of inputs that moves a signal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +45,7 @@ pub(crate) fn is_coordinate(id: &str) -> bool {
 
 impl Drive {
     /// Finds the drive of a signal by names and units.
-    pub(crate) fn of(signal: &MeasuredSignal, inputs: &[&str]) -> Self {
+    pub(crate) fn of(signal: &MappedSignal, inputs: &[&str]) -> Self {
         if inputs.len() == 1 {
             return Drive::Input(0);
         }
@@ -123,10 +123,10 @@ mod tests {
 
     #[test]
     fn names_and_units_tell_the_drive() {
-        let signal = |id: &str, unit: &str| MeasuredSignal {
+        let signal = |id: &str, unit: &str| MappedSignal {
             id: id.into(),
             unit: unit.into(),
-            ..MeasuredSignal::default()
+            ..MappedSignal::default()
         };
         let both = ["voltage_right", "voltage_left"];
         for (id, unit, drive) in [

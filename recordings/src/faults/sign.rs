@@ -5,7 +5,7 @@ use loopsight_core::unit::parse;
 use super::drive::{Drive, is_coordinate, side};
 use super::{large, signal};
 use crate::fault::{Fault, FaultKind};
-use crate::map::{MeasuredSignal, Recording};
+use crate::map::{MappedSignal, Recording};
 
 /// Samples count when drive and velocity are both above this share of their large values: clear of
 /// friction, noise and the moment of reversal.
@@ -17,7 +17,7 @@ const DISAGREE: f64 = 0.9;
 
 pub(crate) fn check(recording: &Recording, inputs: &[&str]) -> Vec<Fault> {
     let mut found = Vec::new();
-    let velocities: Vec<(usize, &MeasuredSignal)> = recording
+    let velocities: Vec<(usize, &MappedSignal)> = recording
         .measured
         .iter()
         .enumerate()

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::fmt::Debug;
 
 use loopsight_core::Parameter;
-use loopsight_model::config::Source;
+use loopsight_model::config::TomlSource;
 use loopsight_model::excitation::{Between, Excitation};
 use loopsight_model::identification::LearningSettings;
 use loopsight_model::log_map::{Column, ColumnMap, Hold, LogMap, Measured};
@@ -129,9 +129,12 @@ fn model_text() -> impl Strategy<Value = String> {
 
 /// Reads, writes and reads; returns both readings.
 fn twice<T: DeserializeOwned + Serialize>(text: &str) -> (T, T) {
-    let first: T = Source::parse("first.toml", text).unwrap().read().unwrap();
+    let first: T = TomlSource::parse("first.toml", text)
+        .unwrap()
+        .read()
+        .unwrap();
     let written = toml::to_string(&first).unwrap();
-    let second = Source::parse("second.toml", &written).unwrap().read();
+    let second = TomlSource::parse("second.toml", &written).unwrap().read();
     (first, second.unwrap_or_else(|e| panic!("{e}\n{written}")))
 }
 
@@ -139,7 +142,7 @@ fn same<T: PartialEq + Debug + DeserializeOwned + Serialize>(
     value: &T,
 ) -> Result<(), TestCaseError> {
     let written = toml::to_string(value).unwrap();
-    let back: T = Source::parse("written.toml", &written)
+    let back: T = TomlSource::parse("written.toml", &written)
         .unwrap()
         .read()
         .unwrap();
@@ -388,7 +391,7 @@ proptest! {
             log,
         };
         let written = toml::to_string(&file).unwrap();
-        let source = Source::parse("written.toml", &written).unwrap();
+        let source = TomlSource::parse("written.toml", &written).unwrap();
         let back = LoopFile::parse(&source).unwrap();
         // Parts behind traits are compared by what they print, which holds every digit.
         prop_assert_eq!(format!("{:?}", &file), format!("{:?}", &back), "{}", written);
