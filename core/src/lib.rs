@@ -51,8 +51,6 @@ pub use plant::{
 };
 pub use real::Real;
 pub use signal::Signal;
-#[doc(hidden)]
-pub use tick::TickRecord as Step;
 pub use tick::{Loop, Observation, Observer, Tick, TickError, TickRecord};
 
 /// What the macros need of this crate.

@@ -7,7 +7,7 @@ mod walk;
 
 pub(crate) use person::{Person, Reply};
 
-use loopsight_model::config::Source;
+use loopsight_model::config::TomlSource;
 use loopsight_model::loop_file::LoopFile;
 
 use crate::error::{Error, Result};
@@ -101,7 +101,7 @@ pub(crate) fn bring_up(
 }
 
 /// The largest magnitude of an input; one without it is refused.
-fn limit_of(source: &Source, file: &LoopFile, id: &str) -> Result<f64> {
+fn limit_of(source: &TomlSource, file: &LoopFile, id: &str) -> Result<f64> {
     let limit = file.limits.get(id).and_then(|l| l.magnitude);
     limit.filter(|l| l.is_finite()).ok_or_else(|| {
         let message = format!(

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use loopsight_model::config::{Source, read_text};
+use loopsight_model::config::{TomlSource, read_text};
 use loopsight_model::model::Model as Composed;
 
 use crate::answers::{CheckAnswer, Checked, FileKind, LogFault, Mistake};
@@ -40,7 +40,7 @@ fn one(path: &Path) -> Checked {
 fn toml(path: &Path) -> Result<Checked> {
     let text = read_text(path)?;
     let file = path.display().to_string();
-    let source = Source::parse(&file, &text)?;
+    let source = TomlSource::parse(&file, &text)?;
     // What kind of file it is shows in the tables it has.
     if source.has("driver") || source.has("controller") {
         let looped = Loop::from_file(path)?;

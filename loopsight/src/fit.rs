@@ -2,7 +2,7 @@
 
 use loopsight_core::Parameter;
 use loopsight_diagnosis::{Fit, FitSettings, fit};
-use loopsight_model::config::Step;
+use loopsight_model::config::PathSegment;
 use serde::Serialize;
 
 use crate::answers::FitAnswer;
@@ -135,7 +135,7 @@ impl Session {
 
     /// The model's text with the values of the fit in it.
     fn fitted_text(&self, fit: &Fit) -> Result<String> {
-        let values: Vec<(Vec<Step>, f64)> = fit
+        let values: Vec<(Vec<PathSegment>, f64)> = fit
             .model
             .parameters
             .iter()

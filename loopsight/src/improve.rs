@@ -1,7 +1,7 @@
 //! Diagnose, add, refit, until nothing more is missing.
 
 use loopsight_diagnosis::improve;
-use loopsight_model::config::{Source, Step};
+use loopsight_model::config::{PathSegment, TomlSource};
 use loopsight_model::model::{Attached, Model as Composed, ModelParameter};
 
 use crate::answers::ImproveAnswer;
@@ -60,13 +60,13 @@ impl Session {
 }
 
 /// The text of a model with the effects of `best` and all fitted values; what it has not is taken out.
-fn improved_text(source: &Source, before: &Composed, best: &Composed) -> String {
+fn improved_text(source: &TomlSource, before: &Composed, best: &Composed) -> String {
     let is = |a: &Attached, b: &Attached| {
         a.meta.id == b.meta.id && a.at.iter().map(|c| c.id).eq(b.at.iter().map(|c| c.id))
     };
     let mut text = source.text.clone();
-    let mut edit = |change: &dyn Fn(&Source) -> String| {
-        if let Ok(present) = Source::parse(&source.file, &text) {
+    let mut edit = |change: &dyn Fn(&TomlSource) -> String| {
+        if let Ok(present) = TomlSource::parse(&source.file, &text) {
             text = change(&present);
         }
     };
@@ -106,7 +106,7 @@ fn improved_text(source: &Source, before: &Composed, best: &Composed) -> String 
             pairs.extend(to.zip(from).take(effect.meta.parameters.len()));
         }
     }
-    let values: Vec<(Vec<Step>, f64)> = pairs
+    let values: Vec<(Vec<PathSegment>, f64)> = pairs
         .into_iter()
         .filter(|(_, from)| from.free)
         .filter_map(|(to, from)| Some((to.path.clone(), from.value?)))

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use loopsight_model::config::{Source, nearest, read_text};
+use loopsight_model::config::{TomlSource, nearest, read_text};
 use loopsight_model::model::{Model as Composed, ModelParameter};
 use loopsight_model::registry;
 
@@ -191,8 +191,8 @@ impl Model {
     }
 
     /// The text with the places of its keys.
-    pub(crate) fn source(&self) -> Result<Source> {
-        Ok(Source::parse(&self.file, &self.text)?)
+    pub(crate) fn source(&self) -> Result<TomlSource> {
+        Ok(TomlSource::parse(&self.file, &self.text)?)
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use loopsight_drivers::{Simulated, simulate_inputs};
-use loopsight_model::config::{ConfigError, Source, read_text};
+use loopsight_model::config::{ConfigError, TomlSource, read_text};
 use loopsight_model::excitation::{self, Excitation, sample_rows};
 use loopsight_model::loop_file::placed;
 use loopsight_model::model::Model as Composed;
@@ -72,7 +72,7 @@ pub(crate) struct Written {
 const MOST_SAMPLES: f64 = 1e7;
 
 impl Written {
-    fn parse(source: &Source) -> std::result::Result<Self, Box<ConfigError>> {
+    fn parse(source: &TomlSource) -> std::result::Result<Self, Box<ConfigError>> {
         let experiment: Self = source.read()?;
         for (key, value) in [
             ("duration_s", experiment.duration_s),
@@ -121,7 +121,7 @@ impl Experiment {
     ///
     /// As [`Experiment::from_file`].
     pub fn from_toml(name: &str, text: &str) -> Result<Self> {
-        let source = Source::parse(name, text)?;
+        let source = TomlSource::parse(name, text)?;
         Ok(Self {
             written: Written::parse(&source)?,
             file: name.to_owned(),
@@ -163,7 +163,7 @@ impl Experiment {
 
     /// Runs the experiment on the robot `model`.
     pub(crate) fn simulate(&self, model: &Composed) -> Result<Run> {
-        let source = Source::parse(&self.file, &self.text)?;
+        let source = TomlSource::parse(&self.file, &self.text)?;
         let written = &self.written;
         let steps = (written.duration_s / written.period_s + 1e-9).floor() as usize;
         let time: Vec<f64> = (0..=steps).map(|k| k as f64 * written.period_s).collect();
@@ -228,7 +228,7 @@ fn held(
 /// The inputs that the CSV `name`, beside the experiment file, holds at the instants `time`; 0
 /// before its first row.
 fn replayed(
-    source: &Source,
+    source: &TomlSource,
     name: &str,
     model: &Composed,
     time: &[f64],

@@ -86,9 +86,6 @@ impl From<usize> for PathSegment {
     }
 }
 
-#[doc(hidden)]
-pub use {PathSegment as Step, TomlSource as Source};
-
 /// The text of a TOML file, which says where each of its values stands.
 #[derive(Debug)]
 pub struct TomlSource {

@@ -242,13 +242,20 @@ mod tests {
 
     impl Driver<f64> for Fake {
         type Error = HostDriverError;
-        fn read(&mut self, measured: &mut [f64]) -> std::result::Result<Sample<f64>, HostDriverError> {
+        fn read(
+            &mut self,
+            measured: &mut [f64],
+        ) -> std::result::Result<Sample<f64>, HostDriverError> {
             self.seen.0.lock().unwrap().0.push('r');
             measured.fill(self.measured);
             let (time, fresh) = (0.0, self.fresh);
             Ok(Sample { time, fresh })
         }
-        fn write(&mut self, command: &[f64], applied: &mut [f64]) -> std::result::Result<(), HostDriverError> {
+        fn write(
+            &mut self,
+            command: &[f64],
+            applied: &mut [f64],
+        ) -> std::result::Result<(), HostDriverError> {
             self.seen.0.lock().unwrap().0.push('w');
             applied.copy_from_slice(command);
             let message = "a pin failed".to_owned();

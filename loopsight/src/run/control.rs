@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use loopsight_model::config::{Source, read_text};
+use loopsight_model::config::{TomlSource, read_text};
 use loopsight_model::loop_file::{Composed, LoopFile};
 use loopsight_model::model::Model as ComposedModel;
 use loopsight_model::registry::{BuildError, DriverContext};
@@ -45,7 +45,7 @@ impl Loop {
     ///
     /// As [`Loop::from_file`].
     pub fn from_toml(name: &str, text: &str) -> Result<Self> {
-        let source = Source::parse(name, text)?;
+        let source = TomlSource::parse(name, text)?;
         Ok(Self {
             parsed: LoopFile::parse(&source)?,
             file: name.to_owned(),
@@ -79,8 +79,8 @@ impl Loop {
     }
 
     /// The text with the places of its keys.
-    pub(crate) fn source(&self) -> Result<Source> {
-        Ok(Source::parse(&self.file, &self.text)?)
+    pub(crate) fn source(&self) -> Result<TomlSource> {
+        Ok(TomlSource::parse(&self.file, &self.text)?)
     }
 
     /// A path in a loop file is relative to that file.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use loopsight_core::supervisor::Event;
-use loopsight_core::{Signal, Step};
+use loopsight_core::{Signal, TickRecord};
 use loopsight_model::loop_file::Composed;
 use loopsight_model::model::Model;
 use loopsight_model::supervisor::{described, turning};
@@ -199,7 +199,7 @@ impl Recorder {
     }
 
     /// Takes a tick.
-    pub(crate) fn push(&mut self, step: &Step<'_, f64>, supervised: bool) {
+    pub(crate) fn push(&mut self, step: &TickRecord<'_, f64>, supervised: bool) {
         let (time, outcome) = (step.tick.time, step.outcome);
         if let Some(event) = &step.event {
             self.happened(time, self.words(event));
@@ -252,7 +252,7 @@ impl Recorder {
         (self.record.ticks - 1).is_multiple_of(self.record.every)
     }
 
-    fn keep(&mut self, step: &Step<'_, f64>) {
+    fn keep(&mut self, step: &TickRecord<'_, f64>) {
         let record = &mut self.record;
         record.time.push(step.tick.time);
         for (i, trace) in record.controlled.iter_mut().enumerate() {

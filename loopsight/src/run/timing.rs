@@ -1,6 +1,6 @@
 //! How well a loop keeps to the clock on the wall.
 
-use loopsight_core::Step;
+use loopsight_core::TickRecord;
 use loopsight_report::Timing;
 
 /// Takes the ticks of a real-time loop.
@@ -18,7 +18,7 @@ pub(super) struct Stopwatch {
 
 impl Stopwatch {
     /// Takes a tick.
-    pub(super) fn take(&mut self, step: &Step<'_, f64>) {
+    pub(super) fn take(&mut self, step: &TickRecord<'_, f64>) {
         if step.tick.index > 0 {
             // Ticks are due a period apart: what differs is how late they began.
             let off = step.late - self.last_late;
@@ -51,7 +51,7 @@ mod tests {
         let mut watch = Stopwatch::default();
         for (index, late) in [0.001, 0.001, 0.004, 0.012, 0.001].into_iter().enumerate() {
             let time = 0.01 * index as f64;
-            watch.take(&Step {
+            watch.take(&TickRecord {
                 tick: Tick {
                     index: index as u64,
                     time,

@@ -1,13 +1,13 @@
 //! What can be seen of a loop while it runs.
 
-use loopsight_core::Step;
+use loopsight_core::TickRecord;
 
 use super::recorder::Recorder;
 
 /// A loop at one tick, for whoever shows it: see [`RunOptions::on_tick`](super::RunOptions::on_tick).
 #[derive(Clone, Copy)]
 pub struct RunView<'r> {
-    step: &'r Step<'r, f64>,
+    step: &'r TickRecord<'r, f64>,
     recorder: &'r Recorder,
     duration_s: Option<f64>,
 }
@@ -64,7 +64,7 @@ pub struct ParameterNow<'r> {
 
 impl<'r> RunView<'r> {
     pub(super) fn new(
-        step: &'r Step<'r, f64>,
+        step: &'r TickRecord<'r, f64>,
         recorder: &'r Recorder,
         duration_s: Option<f64>,
     ) -> Self {

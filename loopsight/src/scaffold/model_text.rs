@@ -1,7 +1,7 @@
 //! `model.toml` of a new robot, from what its plant declares.
 
 use loopsight_core::{Parameter, PlaceKind, PlantMeta, Signal};
-use loopsight_model::config::Step;
+use loopsight_model::config::PathSegment;
 use loopsight_model::model::{Model, misfit};
 use loopsight_model::registry::{self, range_text};
 
@@ -53,8 +53,8 @@ pub(super) fn model_text(
         .map_or(&[][..], |(_, table)| table)
         .iter()
         .filter_map(|step| match step {
-            Step::Key(key) => Some(key.as_str()),
-            Step::Index(_) => None,
+            PathSegment::Key(key) => Some(key.as_str()),
+            PathSegment::Index(_) => None,
         })
         .collect();
     let table = if table.is_empty() {
