@@ -1,4 +1,78 @@
-//! Adaptive control you can see into: the library, and the command built on it.
+//! Adaptive control you can see into: compare a model with measurements, fit it, find out which
+//! physical effect it lacks, add that, and run the control loop that uses it.
+//!
+//! # The workflow
+//!
+//! A [`Model`] is a plant with effects and sensors, made of TOML. A [`Log`] is what was applied to a machine
+//! and what was measured. A [`Session`] owns both, and answers.
+//!
+//! **Compare.** How far is the model from the machine, and where does it fail?
+//!
+//! ```
+//! use loopsight::{CompareOptions, Log, Model, Session};
+//!
+//! # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/hidden-effect/oscillator_coulomb_friction");
+//! # let file = |name: &str| format!("{folder}/{name}");
+//! let session = Session::new(Model::from_file(file("model.toml"))?, Log::read(file("mixed.csv"))?)?;
+//! let compared = session.compare(&CompareOptions::default())?;
+//! println!("{}", compared.summary);
+//! # Ok::<(), loopsight::Error>(())
+//! ```
+//!
+//! **Fit.** The parameters, with intervals that mean what they say: [`Session::fit`].
+//!
+//! **Diagnose.** Which effect is missing? Every effect of the library is tried at every place, and judged on
+//! data that no fit saw. **Improve** adds what is missing and refits, until nothing more is.
+//!
+//! ```
+//! use loopsight::{DiagnoseOptions, ImproveOptions, Log, Model, Session};
+//!
+//! # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/hidden-effect/oscillator_coulomb_friction");
+//! # let file = |name: &str| format!("{folder}/{name}");
+//! let session = Session::new(Model::from_file(file("model.toml"))?, Log::read(file("mixed.csv"))?)?;
+//! let found = session.diagnose(&DiagnoseOptions::default())?;
+//! assert_eq!(found.missing.map(|m| m.effect).as_deref(), Some("coulomb_friction"));
+//!
+//! let improved = session.improve(&ImproveOptions::default())?;
+//! let better = improved.model().map(|model| model.to_toml()); // comments kept, values fitted
+//! # assert!(better.is_some_and(|text| text.contains("coulomb_friction")));
+//! # Ok::<(), loopsight::Error>(())
+//! ```
+//!
+//! **Ask for more data** where a log cannot tell: [`Session::experiment`] plans the inputs that would.
+//! **Run** the loop with the better model: [`Session::run`]. [`Session::simulate`] makes the log of a robot
+//! that is not there.
+//!
+//! # Without files
+//!
+//! Models of text and logs of arrays work as well: [`Model::from_toml`], [`Log::in_memory`],
+//! [`Log::from_bytes`].
+//!
+//! # Answers
+//!
+//! Each answer ([`answers`]) has numbers, a [`summary`](answers::DiagnoseAnswer::summary) in words, most a
+//! page with pictures (`page`), and serialises to exactly what the command prints with `--json`
+//! ([`Answer::to_json`]). Its key `schema` names a JSON Schema that is published under `docs/schema/`.
+//!
+//! # Long work
+//!
+//! Options take a callback and a token: [`DiagnoseOptions::progress`], [`DiagnoseOptions::cancel`]. What was
+//! found until then is the answer.
+//!
+//! # Parts of one's own
+//!
+//! [`parts`] has what a plant or an effect is written with; [`list`](list()) and [`explain`](explain()) show
+//! all that is known. The programs in `examples/` go from three lines to an effect of one's own.
+//!
+//! # Features
+//!
+//! | feature | by default | what it adds |
+//! |---|---|---|
+//! | `cli` | yes | the command: the binary `loopsight`, and `cli::run()` for crates with parts of their own |
+//! | `serial` | with `cli` | robots at the end of a serial line: `Session::send`, the driver `serial`, the controller `aboard` |
+//! | `schema` | no | the module `schema`: JSON Schemas of the answers |
+//!
+//! `default-features = false` leaves a library without terminals and serial ports.
 
 mod about;
 mod add;
