@@ -1,5 +1,5 @@
 "use strict";
-// Draws the charts of a page (chart.rs says what they hold) with plotly.js when they come into view.
+// Unpacks plotly.js and draws the charts of a page (chart.rs says what they hold) when they come into view.
 (() => {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const coarse = matchMedia("(pointer: coarse)");
@@ -162,34 +162,61 @@
     }
   }
 
-  function draw(div) {
-    div.chart ??= JSON.parse(div.querySelector("script").textContent);
+  // gzip in base64, as packed.rs makes it.
+  async function unpacked(element) {
+    const bytes = Uint8Array.from(atob(element.textContent), letter => letter.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  }
+
+  async function load() {
+    const script = document.createElement("script");
+    script.textContent = await unpacked(document.getElementById("library"));
+    document.head.append(script);
+    return Plotly;
+  }
+
+  async function draw(div) {
+    div.drawn = true;
+    div.chart ??= JSON.parse(await unpacked(div.querySelector("script")));
+    await library;
     const theme = dark.matches ? themes.dark : themes.light;
     const drawn = traces(div.chart, theme);
     const config = {
       responsive: true, doubleClick: "autosize", displaylogo: false, displayModeBar: div.chart.small ? false : coarse.matches ? true : "hover",
-      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], showSendToCloud: false, plotlyServerURL: "",
     };
-    Plotly.react(div, drawn, layout(div.chart, theme), config);
+    await Plotly.react(div, drawn, layout(div.chart, theme), config);
     legend(div, drawn);
-    div.drawn = true;
   }
+
+  function trouble(error) {
+    const box = document.getElementById("trouble");
+    box.textContent = typeof DecompressionStream === "undefined"
+      ? "The charts are missing: this browser cannot unpack them. Chrome from version 80, Firefox from 113 and Safari from 16.4 can."
+      : `The charts are missing: ${error}`;
+    box.hidden = false;
+    throw error;
+  }
+
+  const show = div => draw(div).catch(trouble);
+  const library = load();
+  library.catch(trouble);
 
   const seen = new IntersectionObserver(entries => {
     for (const entry of entries) {
-      if (entry.isIntersecting && !entry.target.drawn) draw(entry.target);
+      if (entry.isIntersecting && !entry.target.drawn) show(entry.target);
     }
   }, { rootMargin: "400px" });
   const charts = [...document.querySelectorAll(".chart")];
   charts.forEach(div => seen.observe(div));
-  dark.addEventListener("change", () => charts.filter(div => div.drawn).forEach(draw));
+  dark.addEventListener("change", () => charts.filter(div => div.drawn).forEach(show));
 
   const runs = [...document.querySelectorAll(".run")];
   const buttons = [...document.querySelectorAll("button[data-run]")];
   const choose = at => {
     runs.forEach((run, k) => { run.hidden = k !== at; });
     buttons.forEach((button, k) => button.setAttribute("aria-pressed", String(k === at)));
-    runs[at].querySelectorAll(".chart").forEach(div => { if (!div.drawn) draw(div); });
+    runs[at].querySelectorAll(".chart").forEach(div => { if (!div.drawn) show(div); });
   };
   buttons.forEach((button, at) => { button.onclick = () => choose(at); });
   if (runs.length) choose(0);

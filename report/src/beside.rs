@@ -165,7 +165,7 @@ pub(crate) fn dependences(before: &Comparison, after: Option<&Comparison>, names
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::{comparison, friction_runs};
+    use crate::fixtures::{comparison, friction_runs, opened};
 
     const NAMES: Names = Names {
         before: "before",
@@ -192,13 +192,13 @@ mod tests {
             *value += 3.0;
         }
         let (before, after) = (comparison(runs), comparison(friction_runs(3, 100)));
-        let html = over_time(&before, Some(&after), NAMES);
+        let html = opened(&over_time(&before, Some(&after), NAMES));
         assert!(
             html.contains("Of 3 runs, the one that errs most: run-2."),
             "{html}"
         );
         assert_eq!(html.matches("\"role\":\"after\"").count(), 4);
-        let html = dependences(&before, Some(&after), NAMES);
+        let html = opened(&dependences(&before, Some(&after), NAMES));
         assert!(html.contains("\"role\":\"mean_after\""));
     }
 
@@ -212,6 +212,6 @@ mod tests {
         }
         let mut runs = friction_runs(1, 1000);
         runs[0].signals[0].measured.fill(f64::NAN);
-        assert!(over_time(&comparison(runs), None, NAMES).contains(",null,"));
+        assert!(opened(&over_time(&comparison(runs), None, NAMES)).contains(",null,"));
     }
 }

@@ -10,7 +10,7 @@ use loopsight_model::model::Model;
 use loopsight_plants as _;
 use loopsight_recordings::{Fault, FaultKind};
 
-use crate::fixtures::{comparison, context, friction_runs, without_library};
+use crate::fixtures::{comparison, context, friction_runs, opened, without_library};
 use crate::{Context, diagnosis_page, improvement_page};
 
 const MODEL: &str = "name = \"Twil\"\n[plant.ddmr]\nK_A = -15.146\nK_B = 0.0\nK_C = 0.136\n\
@@ -164,7 +164,7 @@ fn pair() -> (Comparison, Comparison) {
 
 fn page_of(diagnosis: &Diagnosis) -> String {
     let (before, after) = pair();
-    without_library(&diagnosis_page(
+    opened(&diagnosis_page(
         &context(),
         diagnosis,
         Some(&before),
@@ -206,7 +206,7 @@ fn every_end_of_an_improvement_has_its_sentence() {
         "What is left does not show in this log",
     ]) {
         let page = improvement_page(&context(), &improvement(verdict), None, None);
-        let page = without_library(&page);
+        let page = opened(&page);
         assert!(page.contains("The model lacked coulomb friction at wheel.right and wheel.left."));
         assert!(page.contains("falls from 14\u{a0}% to 2.5\u{a0}%"));
         assert!(page.contains(sentence), "{verdict:?}");
@@ -252,7 +252,7 @@ fn the_error_falls_step_by_step() {
     };
     let improvement = improvement(Conclusion::NothingMissing);
     let page = improvement_page(&context, &improvement, Some(&before), Some(&after));
-    let page = without_library(&page);
+    let page = opened(&page);
     for text in [
         "<b>The model as it is</b>",
         "The log does not pin coulomb_friction.level:",
@@ -334,7 +334,7 @@ fn what_is_not_a_number_is_left_out() {
     after.runs.truncate(1);
     after.runs[0].signals.truncate(1);
     let page = diagnosis_page(&context(), &diagnosis, Some(&before), Some(&after));
-    let page = without_library(&page);
+    let page = opened(&page);
     assert!(page.contains(",null,"));
     assert_eq!(
         page.find("NaN")
@@ -342,7 +342,7 @@ fn what_is_not_a_number_is_left_out() {
         None
     );
     // The data of the charts are JSON.
-    for chart in page.split("<script type=\"application/json\">").skip(1) {
+    for chart in page.split("<script type=\"application/gzip\">").skip(1) {
         let text = chart.split("</script>").next().unwrap();
         serde_json::from_str::<serde_json::Value>(text).unwrap();
     }

@@ -243,7 +243,7 @@ pub(crate) fn estimates(parameters: &[(&String, &Estimate)]) -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::fixtures::{comparison, context, friction_runs, without_library};
+    use crate::fixtures::{comparison, context, friction_runs, opened};
 
     pub(crate) fn parameters() -> BTreeMap<String, Estimate> {
         let estimate = |value: f64, half: f64, unit: &str, verdict| Estimate {
@@ -314,7 +314,7 @@ pub(crate) mod tests {
 
     #[test]
     fn parameters_are_listed_with_what_is_known_of_them() {
-        let page = without_library(&page(300, false));
+        let page = opened(&page(300, false));
         for text in [
             "the error fell from 21\u{a0}% to 5.2\u{a0}% of the measured variation",
             "which the fit has not seen, it is 7.9\u{a0}%",
@@ -342,7 +342,7 @@ pub(crate) mod tests {
 
     #[test]
     fn the_history_of_a_recursive_fit_is_drawn() {
-        let page = without_library(&page(300, true));
+        let page = opened(&page(300, true));
         assert!(page.contains("How the estimate converged") && page.contains("K_C, m/(s²·V)"));
         assert!(page.contains("Recursive least squares over 12 samples"));
     }

@@ -2,6 +2,7 @@
 
 use loopsight_diagnosis::{Comparison, RunTrace, SignalScore, SignalTrace, Statement};
 
+use crate::packed::tests::unpacked;
 use crate::page::Context;
 use crate::{ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace};
 
@@ -19,9 +20,20 @@ pub(crate) fn context() -> Context {
 }
 
 pub(crate) fn without_library(page: &str) -> String {
-    let from = page.find("plotly.js v").unwrap();
-    let to = from + page[from..].find("</script>").unwrap();
-    format!("{}{}", &page[..from], &page[to..])
+    page.replace(crate::packed::library(), "")
+}
+
+/// `page` without the charts' library and with the charts' data as they were before they were packed.
+pub(crate) fn opened(page: &str) -> String {
+    const OPENING: &str = "<script type=\"application/gzip\">";
+    let page = without_library(page);
+    let mut parts = page.split(OPENING);
+    let mut out = parts.next().unwrap().to_owned();
+    for part in parts {
+        let (packed, rest) = part.split_once("</script>").unwrap();
+        out += &format!("{OPENING}{}</script>{rest}", unpacked(packed));
+    }
+    out
 }
 
 /// Deterministic noise in ±1.

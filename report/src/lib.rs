@@ -23,6 +23,7 @@ mod improvement;
 mod intervals;
 mod next;
 mod numbers;
+mod packed;
 mod page;
 mod record;
 mod residual_force;

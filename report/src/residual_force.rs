@@ -111,6 +111,7 @@ fn name(curve: &Curve, what: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::opened;
     use loopsight_diagnosis::Expression;
 
     fn force() -> ResidualForce {
@@ -149,7 +150,7 @@ mod tests {
     #[test]
     fn the_force_is_shown_with_its_expression() {
         assert_eq!(residual_force(None), "");
-        let html = residual_force(Some(&force()));
+        let html = opened(&residual_force(Some(&force())));
         for text in [
             "The residual force at shaft depends on position: 62 % of its variance.",
             "position within a turn, rad",

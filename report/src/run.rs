@@ -271,12 +271,12 @@ fn events(record: &LoopRecord) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::{context, loop_record, without_library};
+    use crate::fixtures::{context, loop_record, opened, without_library};
 
     #[test]
     fn the_page_says_and_shows() {
         let record = loop_record(1000);
-        let page = without_library(&run_page(&context(), &record));
+        let page = opened(&run_page(&context(), &record));
         for text in [
             "The loop ran for 10\u{a0}s in 1000 ticks of 10\u{a0}ms.",
             "The inputs were saturated",
@@ -307,7 +307,7 @@ mod tests {
             missed: 3,
             longest_s: 0.001,
         });
-        let page = without_library(&run_page(&context(), &record));
+        let page = opened(&run_page(&context(), &record));
         for text in [
             "The loop ran for 40\u{a0}s in 4000 ticks of 10\u{a0}ms.",
             "% of the samples were stale",
