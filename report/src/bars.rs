@@ -1,8 +1,9 @@
-//! Horizontal bars of errors, with lines for what they are held against.
+//! Horizontal bars of errors, with lines to compare them with.
 
-use crate::numbers::percent;
+use crate::html::text;
+use crate::words::error;
 
-/// Something to hold bars against.
+/// Something to compare bars with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Line {
     pub(crate) name: &'static str,
@@ -83,7 +84,7 @@ impl Scale {
                  <path class=\"{}\" d=\"M8 0V10\"/></svg> {}: {}</span> ",
                 line.class,
                 line.name,
-                percent(line.value)
+                text(&error(line.value))
             ));
         }
         out + "</p>\n"
@@ -105,7 +106,7 @@ mod tests {
         let scale = Scale::new([0.1, 0.2], 0.2, &[FLOOR]);
         assert!(scale.bar(&[("error", 0.104)]).contains("width=\"50.00\""));
         assert!(scale.bar(&[]).contains("class=\"floor\" d=\"M9.62 0V10\""));
-        assert!(scale.legend(&[]).contains("noise alone: 2.0\u{a0}%"));
+        assert!(scale.legend(&[]).contains("noise alone: 2.00\u{a0}%"));
     }
 
     #[test]

@@ -1,19 +1,20 @@
-//! A model before and after a change, both held against the same measurements.
+//! A model before and after a change, both compared with the same measurements.
 
 use loopsight_diagnosis::{Comparison, RunTrace};
 
 use crate::chart::{Chart, Role};
 use crate::errors::{residual, rms, signal};
-use crate::html::escape;
-use crate::numbers::{axis, percent, plain, quantity};
+use crate::html::{escape, text};
+use crate::numbers::axis;
 use crate::scatter;
-use crate::words::run_name;
+use crate::words::comparison::run_name;
+use crate::words::{error, number, quantity};
 
 /// Signals that are drawn over time.
 const MOST_SIGNALS: usize = 4;
 /// Signals whose dependences are open to see at once.
 const OPEN: usize = 2;
-/// Longer runs show at first the stretch of this length that errs most, s.
+/// Longer runs show at first the stretch of this length with the largest error, s.
 const STRETCH: f64 = 6.0;
 
 /// Names of the two models in the charts.
@@ -56,26 +57,26 @@ pub(crate) fn over_time(before: &Comparison, after: Option<&Comparison>, names: 
     let mut said = Vec::new();
     if before.runs.len() > 1 {
         said.push(format!(
-            "Of {} runs, the one that errs most: {}.",
+            "The run with the largest error of {}: {}.",
             before.runs.len(),
             run_name(&run.name, at)
         ));
     }
     if ids.len() > MOST_SIGNALS {
         said.push(format!(
-            "Of {} signals, the {MOST_SIGNALS} that err most.",
+            "The {MOST_SIGNALS} signals with the largest errors of {}.",
             ids.len()
         ));
     }
     if chart.x_range.is_some() {
         said.push(format!(
-            "Shown first: the {} that err most.",
-            quantity(&plain(STRETCH), "s")
+            "Shown at first: the {} with the largest error.",
+            quantity(&number(STRETCH), "s")
         ));
     }
     format!(
         "<p class=\"what\">{}</p>\n{}",
-        escape(&said.join(" ")),
+        text(&said.join(" ")),
         chart.html()
     )
 }
@@ -88,7 +89,7 @@ fn by_error(comparison: &Comparison) -> Vec<&str> {
     scores.into_iter().map(|s| s.id.as_str()).collect()
 }
 
-/// The run in which the signal `id` errs most.
+/// The run in which the error of the signal `id` is largest.
 fn worst_run<'a>(comparison: &'a Comparison, id: Option<&str>) -> Option<(usize, &'a RunTrace)> {
     let error = |run: &RunTrace| {
         let error = id
@@ -103,7 +104,7 @@ fn worst_run<'a>(comparison: &'a Comparison, id: Option<&str>) -> Option<(usize,
         .max_by(|a, b| error(a.1).total_cmp(&error(b.1)).then(b.0.cmp(&a.0)))
 }
 
-/// The stretch of a long run in which the signal `id` errs most.
+/// The stretch of a long run in which the error of the signal `id` is largest.
 fn stretch(run: &RunTrace, id: &str) -> Option<[f64; 2]> {
     let (first, last) = (*run.time.first()?, *run.time.last()?);
     let duration = last - first;
@@ -142,12 +143,12 @@ pub(crate) fn dependences(before: &Comparison, after: Option<&Comparison>, names
         let fell = match with {
             Some(with) => format!(
                 "error {} ({}), {} ({})",
-                percent(score.nrmse),
+                error(score.nrmse),
                 names.before,
-                percent(with.nrmse),
+                error(with.nrmse),
                 names.after
             ),
-            None => format!("error {}", percent(score.nrmse)),
+            None => format!("error {}", error(score.nrmse)),
         };
         let runs = after.map(|c| (names.after, c.runs.as_slice()));
         let charts = scatter::charts(&before.runs, runs, id, &score.unit).concat();
@@ -156,7 +157,7 @@ pub(crate) fn dependences(before: &Comparison, after: Option<&Comparison>, names
             "<details class=\"signal\"{open}><summary><h3>{}</h3> <span class=\"soft\">{}</span>\
              </summary><div class=\"grid\">{charts}</div></details>\n",
             escape(id),
-            escape(&fell)
+            text(&fell)
         ));
     }
     out
@@ -173,7 +174,7 @@ mod tests {
     };
 
     #[test]
-    fn a_long_run_opens_where_it_errs_most() {
+    fn a_long_run_opens_where_its_error_is_largest() {
         let mut runs = friction_runs(1, 3000);
         assert_eq!(stretch(&friction_runs(1, 700)[0], "linear_velocity"), None);
         for value in &mut runs[0].signals[0].free_run[1500..1600] {
@@ -182,7 +183,7 @@ mod tests {
         let [from, to] = stretch(&runs[0], "linear_velocity").unwrap();
         assert!(from <= 15.0 && to >= 16.0 && (to - from - STRETCH).abs() < 1e-9);
         let html = over_time(&comparison(runs), None, NAMES);
-        assert!(html.contains("Shown first: the 6\u{a0}s that err most."));
+        assert!(html.contains("Shown at first: the 6\u{a0}s with the largest error."));
     }
 
     #[test]
@@ -194,7 +195,7 @@ mod tests {
         let (before, after) = (comparison(runs), comparison(friction_runs(3, 100)));
         let html = opened(&over_time(&before, Some(&after), NAMES));
         assert!(
-            html.contains("Of 3 runs, the one that errs most: run-2."),
+            html.contains("The run with the largest error of 3: run-2."),
             "{html}"
         );
         assert_eq!(html.matches("\"role\":\"after\"").count(), 4);

@@ -4,14 +4,14 @@ use loopsight_diagnosis::{Diagnosis, Estimate, Explanation};
 use loopsight_model::registry;
 
 use crate::bars::{Line, Scale};
-use crate::conclusion::{effect_name, found, place_name};
-use crate::html::{escape, identifier, table};
-use crate::numbers::{percent, quantity, show, with_error};
+use crate::html::{escape, identifier, table, text};
+use crate::words::diagnosis::{found, significance};
+use crate::words::{error, place, quantity, rounded, with_error};
 
 /// Explanations that are there at once; the others unfold.
 const SHOWN: usize = 5;
 
-/// The lines that errors of a diagnosis are held against.
+/// The lines that errors of a diagnosis are compared with.
 pub(crate) fn lines(diagnosis: &Diagnosis) -> [Line; 2] {
     [
         Line {
@@ -47,9 +47,9 @@ pub(crate) fn candidates(diagnosis: &Diagnosis) -> String {
     let (shown, more) = rows.split_at(rows.len().min(SHOWN));
     let all_bars = (
         "error",
-        "error with the effect added, on data not fitted to",
+        "error with the effect added, on data not used in the fit",
     );
-    let found_bars = ("found", "the same, of what explains these data");
+    let found_bars = ("found", "the same, for what explains these data");
     let mut out = match believed {
         Some(_) => scale.legend(&[all_bars, found_bars]),
         None => scale.legend(&[all_bars]),
@@ -57,7 +57,7 @@ pub(crate) fn candidates(diagnosis: &Diagnosis) -> String {
     out.push_str(&format!("<div class=\"candidates\">{}", shown.concat()));
     if !more.is_empty() {
         out.push_str(&format!(
-            "<details class=\"more\"><summary>{} more that were fitted to the end</summary>{}</details>",
+            "<details class=\"more\"><summary>{} more candidates</summary>{}</details>",
             more.len(),
             more.concat()
         ));
@@ -76,7 +76,7 @@ fn row(
             ("<span class=\"badge best\">missing</span>", "found")
         }
         Some(best) if best.indistinguishable_from.contains(&explanation.place) => (
-            "<span class=\"badge\">not told apart from the first</span>",
+            "<span class=\"badge\">could be this instead</span>",
             "found",
         ),
         _ => ("", "error"),
@@ -96,25 +96,14 @@ fn row(
          <span class=\"soft\">{}</span></span>{}<span class=\"amount\"><b>{}</b><br>\
          <span class=\"soft\">significance {}</span></span>\
          <span class=\"short\">{}</span></summary>{}</details>\n",
-        escape(&effect_name(&explanation.place.effect)),
+        identifier(&explanation.place.effect),
         identifier(&explanation.place.at.join(", ")),
         scale.bar(&[(bar, explanation.nrmse)]),
-        percent(explanation.nrmse),
-        in_tenths(explanation.significance),
+        text(&error(explanation.nrmse)),
+        text(&significance(explanation.significance)),
         short.join(" "),
         about(explanation),
     )
-}
-
-/// A number of standard errors: tenths are enough, and beyond a hundred none.
-fn in_tenths(significance: f64) -> String {
-    if !significance.is_finite() {
-        "–".into()
-    } else if significance < 99.95 {
-        format!("{significance:.1}")
-    } else {
-        format!("{significance:.0}")
-    }
 }
 
 /// `level 1.20 ± 0.02 V`, as HTML.
@@ -122,15 +111,11 @@ fn in_short(name: &str, e: &Estimate) -> String {
     let (value, _) = with_error(e.value, e.std_error.unwrap_or(f64::NAN));
     let value = match e.interval95 {
         Some([low, high]) if low.is_finite() && high.is_finite() => {
-            format!("{value}\u{a0}±\u{a0}{}", show((high - low) / 2.0, 2))
+            format!("{value}\u{a0}±\u{a0}{}", rounded((high - low) / 2.0, 2))
         }
         _ => value,
     };
-    format!(
-        "{} {}",
-        identifier(name),
-        escape(&quantity(&value, &e.unit))
-    )
+    format!("{} {}", identifier(name), text(&quantity(&value, &e.unit)))
 }
 
 /// The parameters and what the library knows of the effect.
@@ -146,7 +131,7 @@ fn about(explanation: &Explanation) -> String {
     if let Some(meta) = meta {
         items.push(("What it is", escape(meta.summary)));
     }
-    items.push(("How it shows", escape(&explanation.note)));
+    items.push(("How it shows", text(&explanation.note)));
     if let Some(meta) = meta {
         items.push(("What helps", escape(meta.remedy)));
         items.push((
@@ -159,13 +144,13 @@ fn about(explanation: &Explanation) -> String {
         let others: Vec<String> = explanation
             .indistinguishable_from
             .iter()
-            .map(place_name)
+            .map(place)
             .collect();
-        items.push(("Not told apart from", escape(&others.join("; "))));
+        items.push(("Could also be", escape(&others.join("; "))));
     }
     out.push_str("<dl>");
-    for (term, text) in items.iter().filter(|(_, text)| !text.is_empty()) {
-        out.push_str(&format!("<dt>{term}</dt><dd>{text}</dd>"));
+    for (term, what) in items.iter().filter(|(_, what)| !what.is_empty()) {
+        out.push_str(&format!("<dt>{term}</dt><dd>{what}</dd>"));
     }
     out + "</dl></div>"
 }
@@ -185,12 +170,12 @@ fn parameters(explanation: &Explanation) -> String {
                     ),
                     &e.unit,
                 ),
-                None => "–".into(),
+                None => "-".into(),
             };
             vec![
                 identifier(name),
-                escape(&quantity(&with_error(e.value, error).0, &e.unit)),
-                escape(&interval),
+                text(&quantity(&with_error(e.value, error).0, &e.unit)),
+                text(&interval),
                 escape(e.verdict.text()),
             ]
         })

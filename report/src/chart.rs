@@ -2,9 +2,10 @@
 
 use serde::Serialize;
 
-use crate::numbers::{rounded_times, significant};
+use crate::numbers::rounded_times;
 use crate::packed::packed;
 use crate::thin::{MOST_POINTS, kept};
+use crate::words::significant;
 
 /// Significant digits of a drawn value.
 const DIGITS: usize = 5;
@@ -25,7 +26,7 @@ pub(crate) enum Role {
     Mean,
     /// As [`Role::Mean`], of a model after it was changed.
     MeanAfter,
-    /// Means without a line between them, and a second series of the like.
+    /// Means without a line between them; the other is a second series of the same kind.
     Dots,
     DotsAfter,
     /// One of several alike: inputs, parameters.
@@ -50,7 +51,7 @@ pub(crate) struct Trace {
     /// Half the height of an error bar or a band.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) spread: Option<Vec<f64>>,
-    /// Held from sample to sample.
+    /// Drawn as steps: each value stays until the next sample.
     pub(crate) step: bool,
     /// Drawn only when its entry in the legend is chosen.
     pub(crate) hidden: bool,
@@ -191,8 +192,8 @@ impl Chart {
         }
     }
 
-    /// Lets the last panel show at first what its traces do after their first fifth, where what
-    /// they do before would dwarf it: a recursive estimate starts with wild guesses.
+    /// Limits what the last panel shows at first, where the first fifth of its traces would dwarf the rest: a
+    /// recursive estimate starts with wild guesses.
     pub(crate) fn settle(&mut self) {
         let Some(panel) = self.panels.last_mut() else {
             return;
@@ -223,7 +224,7 @@ impl Chart {
         serde_json::to_string(self).unwrap_or_else(|_| "null".into())
     }
 
-    /// The chart as an element of a page.
+    /// The chart as an element of a page, its data packed.
     pub(crate) fn html(&self) -> String {
         // As page.js lays it out: a title above each panel, the horizontal axis below.
         let above = if self.events.is_empty() { 0 } else { 22 };
@@ -234,8 +235,8 @@ impl Chart {
             "<div class=\"legend\"></div>"
         };
         let caption = if self.thinned {
-            "<figcaption>Drawn with fewer points than were recorded: of every short stretch the \
-             least and the greatest value.</figcaption>"
+            "<figcaption>Drawn with fewer points than were recorded: the least and the greatest value of \
+             every short stretch.</figcaption>"
         } else {
             ""
         };

@@ -5,14 +5,15 @@ use loopsight_recordings::{Fault, Severity};
 
 use crate::chart::{Chart, Role};
 use crate::errors::{residual, rms, signal};
-use crate::html::{escape, identifier, list, marked, sentence, table};
-use crate::numbers::{axis, plain, quantity, show, tenths};
+use crate::html::{escape, identifier, list, marked, sentence, table, text};
+use crate::numbers::axis;
 use crate::page::{Context, page, section};
 use crate::scatter;
-use crate::words::{run_name, verdict};
+use crate::words::comparison::{run_name, summary};
+use crate::words::{fault, hundredths, number, quantity, rounded, severity};
 
-/// The page that holds a model against measurements: scores, faults of the log, every run over
-/// time, and where the model fails.
+/// The page that compares a model with measurements: scores, faults of the log, every run over time, and
+/// where the model fails.
 pub fn comparison_page(context: &Context, comparison: &Comparison) -> String {
     page(context, &body(comparison))
 }
@@ -21,56 +22,46 @@ pub fn comparison_page(context: &Context, comparison: &Comparison) -> String {
 pub(crate) fn body(comparison: &Comparison) -> String {
     let verdict = format!(
         "<p class=\"verdict\">{}</p>\n",
-        escape(&verdict(comparison))
+        text(&summary(comparison).join(" "))
     );
-    let mut body = verdict + &faults(&comparison.faults, "compared") + &scores(&comparison.signals);
-    body.push_str(&section(
-        "Over time",
-        "Drag across a chart to zoom in, double-click to see all again; a tap on a legend entry \
-         shows or hides it.",
-        &runs(comparison),
-    ));
+    let mut body = verdict + &faults(&comparison.faults) + &scores(&comparison.signals);
+    body.push_str(&section("Over time", HOW_TO_LOOK, &runs(comparison)));
     body.push_str(&section(
         "Where it fails",
-        "Residual: measured less free run. With nothing missing from the model it depends on \
-         nothing, and its averages lie on zero. Dots: samples, at most 3000 of them; line: mean \
-         and standard deviation of all samples nearby.",
+        "The residual is the measurement minus the free run. If the model lacks nothing, the residual depends on \
+         nothing and its means lie on zero. Dots are samples, at most 3000 of them. The line is the mean of the \
+         samples nearby, with their standard deviation.",
         &failures(comparison),
     ));
     body
 }
 
-/// The faults of a log in a box, found before anything was `done`.
-pub(crate) fn faults(faults: &[Fault], done: &str) -> String {
+/// How charts over time are used.
+pub(crate) const HOW_TO_LOOK: &str = "Drag across a chart to zoom in. Double-click to see everything again. Tap an \
+    entry of the legend to show or hide it.";
+
+/// The faults of a log in a box.
+pub(crate) fn faults(faults: &[Fault]) -> String {
     if faults.is_empty() {
         return String::new();
     }
     let items: String = faults
         .iter()
-        .map(|fault| {
-            let grave = match fault.severity() {
+        .map(|one| {
+            let grave = match one.severity() {
                 Severity::Fatal => " class=\"fatal\"",
                 Severity::Note | Severity::Warning => "",
             };
-            let run = match fault.run.as_str() {
-                "" => String::new(),
-                run => format!(" in run {}", escape(run)),
-            };
-            let signal = match fault.signal.as_str() {
-                "" => String::new(),
-                signal => format!(" <code>{}</code>", identifier(signal)),
-            };
-            let kind = fault.kind.name().replace('_', " ");
             format!(
-                "<li{grave}><b>{}</b>{signal}{run}: {}</li>",
-                escape(&kind),
-                marked(&fault.detail)
+                "<li{grave}><b>{}</b>: {}</li>",
+                severity(one),
+                marked(&fault(one))
             )
         })
         .collect();
     format!(
-        "<div class=\"box\"><h2>Faults of the log</h2><p>Found before anything was {done}; what \
-         they touch is doubtful.</p><ul>{items}</ul></div>\n"
+        "<div class=\"box\"><h2>Faults of the log</h2><p>Results that rest on these samples are \
+         doubtful.</p><ul>{items}</ul></div>\n"
     )
 }
 
@@ -80,29 +71,25 @@ fn scores(scores: &[SignalScore]) -> String {
         .map(|s| {
             vec![
                 identifier(&s.id),
-                escape(&quantity(&show(s.rmse, 3), &s.unit)),
-                tenths(s.fit_percent),
-                show(s.nrmse, 3),
-                show(s.one_step_nrmse, 3),
+                text(&quantity(&rounded(s.rmse, 3), &s.unit)),
+                text(&hundredths(s.nrmse)),
+                text(&hundredths(s.fit_percent / 100.0)),
+                text(&hundredths(s.one_step_nrmse)),
             ]
         })
         .collect();
-    let header = [
-        "signal",
-        "error (rms)",
-        "reproduced",
-        "nrmse",
-        "nrmse, one step",
-    ];
+    let header = ["signal", "rmse", "nrmse", "fit", "one-step nrmse"];
     let table = table(&header, &[false, true, true, true, true], &rows);
     format!(
-        "{table}<details><summary>What these numbers mean</summary><p><b>Free run</b>: the model \
-         simulated from the inputs alone, from an estimated initial state; it never sees the \
-         measurement. <b>One step</b>: the model predicts each sample from the one measured \
-         before; easy, so it hides errors that add up. <b>rms</b>: root mean square of measured \
-         less free run. <b>nrmse</b>: the same over the standard deviation of the measurement; 0 \
-         is perfect, 1 is no better than a constant. <b>Reproduced</b>: 100 % × (1 − nrmse).</p>\
-         </details>\n"
+        "{table}<details><summary>What these numbers mean</summary><dl class=\"terms\">\
+         <dt>Free run</dt><dd>The model is simulated from the measured inputs alone, from an estimated initial \
+         state. It never sees the measurement, so its errors add up and show.</dd>\
+         <dt>One step</dt><dd>The model predicts each sample from the measured sample before it. That is easy: \
+         errors that add up stay hidden.</dd>\
+         <dt>rmse</dt><dd>Root mean square of measurement minus free run.</dd>\
+         <dt>nrmse</dt><dd>The rmse divided by the standard deviation of the measurement. 0 % is perfect, 100 % \
+         is no better than a constant.</dd>\
+         <dt>fit</dt><dd>100 % minus nrmse.</dd></dl></details>\n"
     )
 }
 
@@ -136,7 +123,7 @@ fn run_table(comparison: &Comparison) -> String {
         comparison
             .signals
             .iter()
-            .map(|s| axis(&format!("{} (rms)", s.id), &s.unit)),
+            .map(|s| axis(&format!("rmse of {}", s.id), &s.unit)),
     );
     let rows: Vec<Vec<String>> = comparison
         .runs
@@ -147,14 +134,12 @@ fn run_table(comparison: &Comparison) -> String {
             let name = escape(&run_name(&run.name, at));
             let mut row = vec![
                 format!("<button type=\"button\" data-run=\"{name}\">{name}</button>"),
-                quantity(&plain(duration), "s"),
+                text(&quantity(&number(duration), "s")),
                 run.time.len().to_string(),
             ];
             row.extend(comparison.signals.iter().map(|s| {
-                show(
-                    signal(run, &s.id).map_or(f64::NAN, |trace| rms(residual(trace))),
-                    2,
-                )
+                let error = signal(run, &s.id).map_or(f64::NAN, |trace| rms(residual(trace)));
+                text(&rounded(error, 2))
             }));
             row
         })
@@ -176,7 +161,7 @@ fn over_time(run: &RunTrace) -> Chart {
         if let Some(trace) = chart.line("one step", Role::OneStep, &signal.one_step) {
             trace.hidden = true;
         }
-        chart.line("model, free run", Role::Model, &signal.free_run);
+        chart.line("free run", Role::Model, &signal.free_run);
         let title = axis(&format!("residual of {}", signal.id), &signal.unit);
         chart.panel_of(&signal.id, title, 110);
         chart.line("residual", Role::Residual, &residual(signal));
@@ -216,7 +201,7 @@ fn failures(comparison: &Comparison) -> String {
             .map(|s| sentence(&s.statement))
             .collect();
         if said.is_empty() {
-            said.push("The error has no pattern that stands out.".to_owned());
+            said.push("The residual has no pattern that stands out.".to_owned());
         }
         let charts: String =
             scatter::charts(&comparison.runs, None, &score.id, &score.unit).concat();
@@ -243,14 +228,14 @@ mod tests {
             &comparison(friction_runs(2, 400)),
         ));
         for text in [
-            "In free run the model reproduces",
+            "Free run: error 7.90\u{a0}% of the standard deviation",
             "inputs, V",
             "linear_velocity, m/s",
             "residual of angular_velocity, rad/s",
-            "The mean residual of linear_velocity is -0.030 m/s forwards and +0.031 m/s backwards.",
-            "The error has no pattern that stands out.",
+            "The mean residual of linear_velocity is −0.030\u{a0}m/s forwards and +0.031\u{a0}m/s backwards.",
+            "The residual has no pattern that stands out.",
             "data-run=\"run-2\"",
-            "model, free run",
+            "free run",
             "\"hidden\":true",
         ] {
             assert!(page.contains(text), "{text}");
@@ -269,7 +254,9 @@ mod tests {
             detail: "never moves <although> it should".into(),
         });
         let page = comparison_page(&context(), &comparison);
-        assert!(page.contains("<li class=\"fatal\"><b>dead sensor</b>"));
+        assert!(page.contains(
+            "<li class=\"fatal\"><b>fault</b>: dead sensor <code>angular_<wbr>velocity</code>"
+        ));
         assert!(page.contains("never moves &lt;although&gt; it should"));
     }
 

@@ -5,16 +5,17 @@ use loopsight_diagnosis::{Advice, Comparison, Conclusion, Diagnosis, Statement};
 use crate::beside::{self, Names};
 use crate::candidates;
 use crate::comparison::faults;
-use crate::conclusion::{effect_name, found, of_diagnosis};
-use crate::html::{marked, sentence};
+use crate::conclusion::conclusion;
+use crate::html::{marked, sentence, text};
 use crate::next;
-use crate::numbers::percent;
 use crate::page::{Context, page, section};
 use crate::residual_force::residual_force;
+use crate::words::diagnosis::{said, with_effect};
+use crate::words::{percent, recordings};
 
-/// The page of a diagnosis: the verdict, the model `before` and `after` the best explanation was
-/// added, held against the same measurements, where it fails, every explanation that was tried,
-/// and what to do next.
+/// The page of a diagnosis: the verdict, the model `before` and `after` the best explanation was added,
+/// compared with the same measurements, where it fails, every explanation that was tried, and what to do
+/// next.
 ///
 /// `before` is the comparison of [`Diagnosis::model`], `after` that of the best explanation's
 /// model; either may be absent.
@@ -24,15 +25,9 @@ pub fn diagnosis_page(
     before: Option<&Comparison>,
     after: Option<&Comparison>,
 ) -> String {
-    let mut body = of_diagnosis(diagnosis).html();
-    body.push_str(&faults(&diagnosis.faults, "fitted"));
-    let with = match (found(diagnosis), diagnosis.candidates.first()) {
-        (Some(best), _) => format!("with {}", effect_name(&best.place.effect)),
-        (None, Some(nearest)) => {
-            format!("with {}, the nearest", effect_name(&nearest.place.effect))
-        }
-        (None, None) => "after".into(),
-    };
+    let mut body = conclusion(&said(diagnosis), diagnosis.verdict);
+    body.push_str(&faults(&diagnosis.faults));
+    let with = with_effect(diagnosis);
     let names = Names {
         before: "the model as it is",
         after: &with,
@@ -72,10 +67,10 @@ pub fn diagnosis_page(
 }
 
 /// What is to be seen in a list of explanations.
-pub(crate) const CANDIDATES: &str = "Every effect of the library was added to the model at every \
-    place it fits, all parameters were fitted anew, and the free run was judged on data that the \
-    fit did not see. First stands the simplest that is not clearly worse than the best, then the \
-    others by their error; tap one to unfold what it is and what helps against it.";
+pub(crate) const CANDIDATES: &str = "Every effect of the library was added to the model at every place where it \
+    fits. All parameters were fitted again, and the free run was judged on data that the fit did not see. The \
+    first candidate is the simplest that is not clearly worse than the best. The others follow by their error. \
+    Tap a candidate to see what it is and what helps against it.";
 
 /// Measured and models over time.
 pub(crate) fn against_measurements(
@@ -84,13 +79,13 @@ pub(crate) fn against_measurements(
     names: Names,
 ) -> String {
     let title = match after {
-        Some(_) => "Before and after, against the measurements",
-        None => "The model against the measurements",
+        Some(_) => "Before and after, compared with the measurements",
+        None => "The model compared with the measurements",
     };
     section(
         title,
-        "Free run: simulated from the inputs alone, with fitted parameters. Beneath each signal \
-         its residual, measured less model: the flatter, the better.",
+        "Both are free runs: simulated from the inputs alone, with fitted parameters. Below each signal is its \
+         residual, the measurement minus the model. The flatter it is, the better.",
         &beside::over_time(before, after, names),
     )
 }
@@ -107,15 +102,15 @@ pub(crate) fn failures(
     if let Some(before) = before {
         let lines = match after {
             Some(_) => {
-                "lines: mean and standard deviation of the samples nearby, before (orange) and after (blue)"
+                "The lines are the means of the samples nearby with their standard deviations, before \
+                 (orange) and after (blue)."
             }
-            None => "line: mean and standard deviation of the samples nearby",
+            None => "The line is the mean of the samples nearby with their standard deviation.",
         };
         body.push_str(&format!(
-            "<h3 class=\"part\">What the residual depends on</h3>\n<p class=\"what\">Grey dots: \
-             samples of the model as it is; {lines}. A line along zero means: nothing left to \
-             explain. A jump at zero is typical of friction, a slope of a wrong gain, waves of \
-             something that turns with the wheel.</p>\n{}",
+            "<h3 class=\"part\">What the residual depends on</h3>\n<p class=\"what\">Grey dots are samples \
+             of the model as it is. {lines} A line along zero leaves nothing to explain. A jump at zero is \
+             typical of friction, a slope of a wrong gain, waves of something that turns with the wheel.</p>\n{}",
             beside::dependences(before, after, names)
         ));
     }
@@ -124,7 +119,7 @@ pub(crate) fn failures(
     }
     section(
         title,
-        "Of the model as it is, with the best parameters it can have on this log.",
+        "This is the error of the model as it is, with the parameters that fit this log best.",
         &body,
     )
 }
@@ -148,14 +143,14 @@ pub(crate) fn shares(statements: &[Statement]) -> String {
                  <rect class=\"ground\" x=\"0\" y=\"2\" width=\"100\" height=\"6\"/>\
                  <rect class=\"error\" x=\"0\" y=\"2\" width=\"{width:.1}\" height=\"6\"/></svg>\
                  <b>{}</b><span>{}</span></li>",
-                percent(share),
+                text(&percent(share)),
                 marked(&sentence(&s.statement))
             )
         })
         .collect();
     format!(
-        "<ul class=\"shares\">{rows}</ul>\n<p class=\"what\">Bars: share of the squared error that \
-         the sentence speaks of; sentences may speak of the same error.</p>\n"
+        "<ul class=\"shares\">{rows}</ul>\n<p class=\"what\">Each bar is a share of the squared error. Two \
+         sentences may speak of the same error.</p>\n"
     )
 }
 
@@ -164,22 +159,18 @@ pub(crate) fn advice(advice: &[Advice]) -> String {
     if advice.is_empty() {
         return String::new();
     }
-    // One experiment may answer several questions.
-    let mut experiments: Vec<(&str, Vec<&str>)> = Vec::new();
-    for a in advice {
-        match experiments.iter_mut().find(|(e, _)| *e == a.experiment) {
-            Some((_, reasons)) => reasons.push(&a.why),
-            None => experiments.push((&a.experiment, vec![&a.why])),
-        }
-    }
-    let items: String = experiments
+    let items: String = recordings(advice)
         .iter()
-        .map(|(experiment, reasons)| {
-            let reasons: String = reasons
+        .map(|r| {
+            let reasons: String = r
+                .because
                 .iter()
                 .map(|why| format!("<br>{}", marked(&format!("Because {why}."))))
                 .collect();
-            format!("<li><b>{}</b>{reasons}</li>", marked(&sentence(experiment)))
+            format!(
+                "<li><b>{}</b>{reasons}</li>",
+                marked(&sentence(&r.experiment))
+            )
         })
         .collect();
     section(
@@ -191,20 +182,18 @@ pub(crate) fn advice(advice: &[Advice]) -> String {
 
 /// The words of the page.
 pub(crate) const TERMS: &str = "<details><summary>What the words mean</summary><dl class=\"terms\">\
-    <dt>Free run</dt><dd>The model simulated from the measured inputs alone, from an estimated \
-    initial state; it never sees the measurement on the way, so errors add up and show.</dd>\
-    <dt>Error (nrmse)</dt><dd>Root mean square of measured less model, divided by the standard \
-    deviation of what was measured; over all signals, the root mean square of theirs. 0 % is \
-    perfect, 100 % is no better than a constant.</dd>\
-    <dt>Data not fitted to</dt><dd>The test recording, or where none is given parts of the log that \
-    were kept back from the fit. A needlessly large model shines on what it was fitted to and fails \
-    there.</dd>\
-    <dt>Noise and resolution alone (floor)</dt><dd>The error that the true model would have: what \
-    the noise of the sensors and the steps of the encoders leave. An error near it cannot be \
-    improved.</dd>\
-    <dt>Significance</dt><dd>How many standard errors the effect is away from doing nothing. Chance \
-    makes 2 often, 4 hardly ever among a hundred candidates.</dd>\
-    <dt>95 % interval</dt><dd>Holds the true value in 95 of 100 such recordings, if the model is \
-    right.</dd>\
-    <dt>Not told apart</dt><dd>Effects that explain these data equally well. Which of them it is, \
-    another recording has to say.</dd></dl></details>\n";
+    <dt>Free run</dt><dd>The model is simulated from the measured inputs alone, from an estimated initial state. \
+    It never sees the measurement, so its errors add up and show.</dd>\
+    <dt>Error (nrmse)</dt><dd>Root mean square of measurement minus model, divided by the standard deviation of \
+    the measurement. Over all signals it is the root mean square of theirs. 0 % is perfect, 100 % is no better \
+    than a constant.</dd>\
+    <dt>Data that the model was not fitted to</dt><dd>The test log, or parts of the log that were kept back from \
+    the fit. A model that is too large does well on the data it was fitted to, and fails there.</dd>\
+    <dt>What noise and resolution would leave</dt><dd>The error of the true model: it comes from the noise of the \
+    sensors and the steps of the encoders. No model does better.</dd>\
+    <dt>Significance</dt><dd>How many standard errors the effect is from no effect. Among a hundred candidates \
+    chance often makes 2, and hardly ever 4.</dd>\
+    <dt>95 % interval</dt><dd>If the model is right, the interval holds the true value in 95 of 100 such \
+    logs.</dd>\
+    <dt>Could be this instead</dt><dd>An effect that explains these data equally well. Another log has to \
+    decide.</dd></dl></details>\n";

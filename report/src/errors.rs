@@ -2,7 +2,7 @@
 
 use loopsight_diagnosis::{RunTrace, SignalTrace};
 
-/// Measured less free run.
+/// Measurement minus free run.
 pub(crate) fn residual(signal: &SignalTrace) -> Vec<f64> {
     signal
         .measured

@@ -45,18 +45,18 @@ pub struct FigureTrace {
     pub time: Vec<f64>,
     /// Values; NaN leaves a gap.
     pub values: Vec<f64>,
-    /// Held from sample to sample.
+    /// Drawn as steps: each value stays until the next sample.
     pub step: bool,
 }
 
-/// What a line of a picture stands for; colours can be told apart by the colour-blind.
+/// What a line of a picture stands for. The colours differ for the colour-blind too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
-    /// Measured: a broad grey line, which others can lie upon without hiding it.
+    /// A measurement: a broad grey line that still shows below others.
     Measured,
-    /// The model, or an ideal response: orange.
+    /// A model, or an ideal response: orange.
     Model,
-    /// What should be: green.
+    /// A reference: green.
     Reference,
     /// Anything else: blue.
     Other,
@@ -77,7 +77,7 @@ impl Style {
     }
 }
 
-/// `figure` as the text of an SVG file, on white, legible beside dark text as beside light.
+/// `figure` as the text of an SVG file, on a white ground.
 pub fn figure_svg(figure: &Figure) -> String {
     let mut svg = String::new();
     let title = if figure.title.is_empty() { 0 } else { 60 };

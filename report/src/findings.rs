@@ -17,12 +17,13 @@ const MODEL: &str = "name = \"Twil\"\n[plant.ddmr]\nK_A = -15.146\nK_B = 0.0\nK_
     K_D = -9.573\nK_E = 0.0\nK_F = 0.656\nhalf_track = 0.131\nwheel_radius = 0.05\n\
     [[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel = 0.9\n";
 
-const ALL: [Conclusion; 5] = [
+const ALL: [Conclusion; 6] = [
     Conclusion::EffectMissing,
     Conclusion::NothingMissing,
     Conclusion::UnknownEffect,
     Conclusion::DataInsufficient,
     Conclusion::LogFaulty,
+    Conclusion::Cancelled,
 ];
 
 fn model(effects: usize) -> Model {
@@ -121,12 +122,12 @@ pub(crate) fn diagnosis(verdict: Conclusion) -> Diagnosis {
     }
 }
 
-/// Friction found, then `last`.
-pub(crate) fn improvement(last: Conclusion) -> Improvement {
-    let best = diagnosis(last).model.is_some().then(|| Fit {
+/// A fit of the model with friction.
+pub(crate) fn fit() -> Fit {
+    Fit {
         comparison: comparison(vec![]),
         parameters: crate::fit::tests::parameters(),
-        derived: std::collections::BTreeMap::new(),
+        derived: BTreeMap::new(),
         method: Method::OutputError,
         nrmse_before: None,
         nrmse_fit: 0.02,
@@ -135,7 +136,12 @@ pub(crate) fn improvement(last: Conclusion) -> Improvement {
         flat: vec![],
         model: model(1),
         history: vec![],
-    });
+    }
+}
+
+/// Friction found, then `last`.
+pub(crate) fn improvement(last: Conclusion) -> Improvement {
+    let best = diagnosis(last).model.is_some().then(fit);
     let step = |added, nrmse_fit, nrmse_test| Step {
         round: 0,
         added,
@@ -150,8 +156,9 @@ pub(crate) fn improvement(last: Conclusion) -> Improvement {
     }
 }
 
-fn pair() -> (Comparison, Comparison) {
-    let before = comparison(friction_runs(2, 300));
+/// A comparison of runs of `n` samples, and one that errs nowhere.
+pub(crate) fn pair(n: usize) -> (Comparison, Comparison) {
+    let before = comparison(friction_runs(2, n));
     let mut after = before.clone();
     for run in &mut after.runs {
         for signal in &mut run.signals {
@@ -163,7 +170,7 @@ fn pair() -> (Comparison, Comparison) {
 }
 
 fn page_of(diagnosis: &Diagnosis) -> String {
-    let (before, after) = pair();
+    let (before, after) = pair(300);
     opened(&diagnosis_page(
         &context(),
         diagnosis,
@@ -175,11 +182,12 @@ fn page_of(diagnosis: &Diagnosis) -> String {
 #[test]
 fn every_conclusion_has_its_sentence() {
     for (verdict, sentence) in ALL.into_iter().zip([
-        "The model lacks coulomb friction at wheel.right and wheel.left.",
+        "The model lacks coulomb_friction at wheel.right and wheel.left.",
         "Nothing is missing from the model.",
-        "Something is missing, and nothing in the library is it.",
+        "Something is missing, and no effect of the library explains it.",
         "This log is not enough to judge the model.",
         "The log is faulty, so it says nothing about the model.",
+        "The diagnosis was cancelled.",
     ]) {
         let page = page_of(&diagnosis(verdict));
         assert!(
@@ -192,23 +200,25 @@ fn every_conclusion_has_its_sentence() {
     blind.verdict = Conclusion::DataInsufficient;
     let page = page_of(&blind);
     assert!(
-        page.contains("This log cannot show what is missing.") && page.contains("by 10\u{a0}%")
+        page.contains("This log cannot show what is missing.")
+            && page.contains("is 10.0\u{a0}% on the log and 14.0\u{a0}% on the test log")
     );
 }
 
 #[test]
 fn every_end_of_an_improvement_has_its_sentence() {
     for (verdict, sentence) in ALL.into_iter().zip([
-        "More seems to be missing (noise alone would leave 1.9\u{a0}%)",
-        "Nothing more is missing: noise and resolution alone would leave 1.9\u{a0}%.",
-        "something is still missing, and nothing in the library is it",
-        "What is left does not show in this log",
-        "What is left does not show in this log",
+        "would leave 1.90\u{a0}%: more may be missing",
+        "Nothing more is missing: noise and resolution alone would leave 1.90\u{a0}%.",
+        "something is still missing, and no effect of the library explains it",
+        "The log does not show what is left",
+        "The log does not show what is left",
+        "The work was cancelled: more may be missing.",
     ]) {
         let page = improvement_page(&context(), &improvement(verdict), None, None);
         let page = opened(&page);
-        assert!(page.contains("The model lacked coulomb friction at wheel.right and wheel.left."));
-        assert!(page.contains("falls from 14\u{a0}% to 2.5\u{a0}%"));
+        assert!(page.contains("The model lacked coulomb_friction at wheel.right and wheel.left."));
+        assert!(page.contains("falls from 14.0\u{a0}% to 2.50\u{a0}%"));
         assert!(page.contains(sentence), "{verdict:?}");
         assert!(!page.contains("NaN"), "{verdict:?}");
     }
@@ -225,16 +235,16 @@ fn every_end_of_an_improvement_has_its_sentence() {
 fn a_class_is_named_beside_the_verdict() {
     let page = page_of(&diagnosis(Conclusion::EffectMissing));
     for text in [
-        "The data cannot tell coulomb friction (wheel.right, wheel.left) from dead zone (input.right)",
+        "The data cannot tell coulomb_friction (wheel.right, wheel.left) from dead_zone (input.right)",
         "<span class=\"badge best\">missing</span>",
-        "not told apart from the first",
+        "could be this instead",
         "1.200\u{a0}V</td><td class=\"number\">1.180 … 1.220\u{a0}V",
         "w = -level tanh(flow/width)",
         "Several levels.",
         "loopsight experiment examples/twil/model.toml --separate \
          coulomb_friction@wheel.right+wheel.left dead_zone@input.right -o experiment.csv",
-        "3 more that were fitted to the end",
-        "with coulomb friction",
+        "3 more candidates",
+        "with coulomb_friction",
         "\"role\":\"after\"",
         "loopsight add examples/twil/model.toml coulomb_friction --at wheel.right wheel.left -o \
          model_coulomb_friction.toml",
@@ -245,7 +255,7 @@ fn a_class_is_named_beside_the_verdict() {
 
 #[test]
 fn the_error_falls_step_by_step() {
-    let (before, after) = pair();
+    let (before, after) = pair(300);
     let context = Context {
         command: "loopsight improve m.toml l.csv --test t.csv -o best.toml --html x.html".into(),
         ..context()
@@ -256,8 +266,8 @@ fn the_error_falls_step_by_step() {
     for text in [
         "<b>The model as it is</b>",
         "The log does not pin coulomb_friction.level:",
-        "<b>+ coulomb friction</b>",
-        "noise and resolution alone, on data not fitted to: 1.9\u{a0}%",
+        "<b>+ coulomb_friction</b>",
+        "noise and resolution alone, on data not used in the fit: 1.90\u{a0}%",
         "Round 2",
         "Parameters of the best model",
         "loopsight compare best.toml ANOTHER_LOG",
@@ -265,7 +275,7 @@ fn the_error_falls_step_by_step() {
         assert!(page.contains(text), "{text}");
     }
     // Only where it was not asked for is there a need to say how to get the model.
-    assert!(!page.contains("Write the best model into a file."));
+    assert!(!page.contains("Write the best model to a file."));
 }
 
 #[test]
@@ -296,7 +306,7 @@ fn nothing_breaks_out_of_a_finding() {
         command: nasty.into(),
         ..context()
     };
-    let (before, after) = pair();
+    let (before, after) = pair(300);
     let page = diagnosis_page(&context, &diagnosis, Some(&before), Some(&after));
     let mut improvement = improvement(Conclusion::NothingMissing);
     improvement.steps[1].added = Some(place(nasty, &[nasty]));
@@ -327,7 +337,7 @@ fn what_is_not_a_number_is_left_out() {
         level.value = f64::NAN;
         level.interval95 = Some([f64::NEG_INFINITY, f64::NAN]);
     }
-    let (mut before, mut after) = pair();
+    let (mut before, mut after) = pair(300);
     for run in &mut before.runs {
         run.signals[0].measured[7] = f64::NAN;
     }
@@ -350,7 +360,7 @@ fn what_is_not_a_number_is_left_out() {
 
 #[test]
 fn findings_are_the_same_every_time() {
-    let (before, after) = pair();
+    let (before, after) = pair(300);
     let pages = || {
         diagnosis_page(&context(), &diagnosis(ALL[0]), Some(&before), Some(&after))
             + &improvement_page(

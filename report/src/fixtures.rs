@@ -231,37 +231,3 @@ pub(crate) fn loop_record(n: usize) -> LoopRecord {
         ..LoopRecord::default()
     }
 }
-
-/// Writes pages and a picture into the folder that `LOOPSIGHT_PAGES` names, to look at.
-#[test]
-fn pages_to_look_at() {
-    let Some(folder) = std::env::var_os("LOOPSIGHT_PAGES") else {
-        return;
-    };
-    let folder = std::path::PathBuf::from(folder);
-    let write = |name: &str, text: &str| crate::save(&folder.join(name), text).unwrap();
-    let mut one = comparison(friction_runs(1, 2500));
-    one.faults.push(loopsight_recordings::Fault {
-        kind: loopsight_recordings::FaultKind::NotANumber,
-        run: String::new(),
-        signal: "angular_velocity".into(),
-        detail: "12 samples are missing between 3.2 s and 3.4 s".into(),
-    });
-    one.runs[0].signals[1].measured[320..332].fill(f64::NAN);
-    write("comparison.html", &crate::comparison_page(&context(), &one));
-    write(
-        "runs.html",
-        &crate::comparison_page(&context(), &comparison(friction_runs(5, 2500))),
-    );
-    write(
-        "long.html",
-        &crate::comparison_page(&context(), &comparison(friction_runs(5, 100_000))),
-    );
-    write("fit.html", &crate::fit::tests::page(2500, false));
-    write("rls.html", &crate::fit::tests::page(2500, true));
-    write("run.html", &crate::run_page(&context(), &loop_record(4500)));
-    write(
-        "figure.svg",
-        &crate::figure_svg(&crate::figure::tests::velocities(2500)),
-    );
-}

@@ -1,5 +1,7 @@
 //! Text into HTML, safely.
 
+use crate::typeset::typeset;
+
 /// `text` as HTML text or as the value of a quoted attribute.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
@@ -16,14 +18,19 @@ pub(crate) fn escape(text: &str) -> String {
     out
 }
 
+/// A sentence or a number as HTML, set as a printer would.
+pub(crate) fn text(plain: &str) -> String {
+    escape(&typeset(plain))
+}
+
 /// As [`escape`], and a long identifier may break into lines after its underscores and dots.
 pub(crate) fn identifier(text: &str) -> String {
     escape(text).replace('_', "_<wbr>").replace('.', ".<wbr>")
 }
 
 /// A sentence as HTML in which `` `names` `` stand as code.
-pub(crate) fn marked(text: &str) -> String {
-    let parts: Vec<&str> = text.split('`').collect();
+pub(crate) fn marked(plain: &str) -> String {
+    let parts: Vec<&str> = plain.split('`').collect();
     let paired = parts.len() % 2 == 1;
     let mut out = String::new();
     for (at, part) in parts.iter().enumerate() {
@@ -31,7 +38,7 @@ pub(crate) fn marked(text: &str) -> String {
         if code && !part.is_empty() {
             out.push_str(&format!("<code>{}</code>", identifier(part)));
         } else {
-            out.push_str(&escape(part));
+            out.push_str(&text(part));
         }
     }
     out
@@ -80,7 +87,7 @@ pub(crate) fn list(sentences: &[String]) -> String {
     }
     let items: String = sentences
         .iter()
-        .map(|s| format!("<li>{}</li>", escape(s)))
+        .map(|s| format!("<li>{}</li>", text(s)))
         .collect();
     format!("<ul>{items}</ul>\n")
 }

@@ -1,22 +1,24 @@
 //! The page of an improvement: the error falling, effect by effect.
 
-use loopsight_diagnosis::{Comparison, Diagnosis, Improvement, Step};
+use loopsight_diagnosis::{Advice, Comparison, Diagnosis, Improvement, Step};
 
 use crate::bars::{Line, Scale};
 use crate::beside::Names;
 use crate::candidates;
 use crate::comparison::faults;
-use crate::conclusion::{added, effect_name, of_improvement, place_name};
+use crate::conclusion::conclusion;
 use crate::diagnosis::{CANDIDATES, TERMS, advice, against_measurements, failures, shares};
 use crate::fit::estimates;
-use crate::html::{escape, identifier, list};
+use crate::html::{escape, identifier, list, text};
 use crate::next;
-use crate::numbers::percent;
 use crate::page::{Context, page, section};
 use crate::residual_force::residual_force;
+use crate::words::fit::not_determined;
+use crate::words::improvement::{added, said};
+use crate::words::{error, place};
 
 /// The page of an improvement: the verdict, the error step by step, the model `before` and `after`
-/// held against the same measurements, where it failed, every explanation that was tried, the
+/// compared with the same measurements, where it failed, every explanation that was tried, the
 /// parameters of the best model, and what to do next.
 ///
 /// `before` is the comparison of the first diagnosis' model, `after` that of
@@ -29,14 +31,14 @@ pub fn improvement_page(
 ) -> String {
     let first = improvement.diagnoses.first();
     let last = improvement.diagnoses.last();
-    let mut body = of_improvement(improvement).html();
+    let mut body = conclusion(&said(improvement), improvement.verdict);
     if let Some(first) = first {
-        body.push_str(&faults(&first.faults, "fitted"));
+        body.push_str(&faults(&first.faults));
     }
     if !improvement.steps.is_empty() {
         body.push_str(&section(
             "The error, step by step",
-            "Each step adds the effect that explains most, and fits all parameters anew.",
+            "Each step adds the effect that explains most, and fits all parameters again.",
             &steps(&improvement.steps, last),
         ));
     }
@@ -60,7 +62,7 @@ pub fn improvement_page(
         let left = shares(&last.where_it_fails);
         if !left.is_empty() {
             body.push_str(&format!(
-                "<details><summary>Where what is left of the error lies</summary>{left}</details>\n"
+                "<details><summary>Where the rest of the error lies</summary>{left}</details>\n"
             ));
         }
     }
@@ -74,23 +76,18 @@ pub fn improvement_page(
             .iter()
             .filter(|(_, e)| e.verdict != loopsight_diagnosis::Verdict::Held)
             .collect();
-        let flat: Vec<String> = best
-            .flat
-            .iter()
-            .map(|f| format!("Not determined by these data: {f}"))
-            .collect();
+        let flat: Vec<String> = best.flat.iter().map(|f| not_determined(f)).collect();
         body.push_str(&section(
             "Parameters of the best model",
-            "Fitted to all of the log.",
+            "They were fitted to the whole log.",
             &(estimates(&all) + &list(&flat)),
         ));
     }
-    let mut advised = Vec::new();
-    for one in improvement.diagnoses.iter().flat_map(|d| &d.advice) {
-        if !advised.contains(one) {
-            advised.push(one.clone());
-        }
-    }
+    let advised: Vec<Advice> = improvement
+        .diagnoses
+        .iter()
+        .flat_map(|d| d.advice.clone())
+        .collect();
     body.push_str(&advice(&advised));
     body.push_str(&section(
         "What to do next",
@@ -104,7 +101,7 @@ pub fn improvement_page(
 /// Bars of the fitted and the unseen error, step by step.
 fn steps(steps: &[Step], last: Option<&Diagnosis>) -> String {
     let floor = Line {
-        name: "noise and resolution alone, on data not fitted to",
+        name: "noise and resolution alone, on data not used in the fit",
         class: "floor",
         value: last.map_or(f64::NAN, |d| d.floor.nrmse),
     };
@@ -112,27 +109,24 @@ fn steps(steps: &[Step], last: Option<&Diagnosis>) -> String {
     let usual = steps.first().map_or(f64::NAN, |s| s.nrmse_test);
     let scale = Scale::new(values, usual, &[floor]);
     let mut out = scale.legend(&[
-        ("error", "on data not fitted to"),
-        ("seen", "on what was fitted to"),
+        ("error", "on data not used in the fit"),
+        ("seen", "on data used in the fit"),
     ]);
     out.push_str("<div class=\"candidates steps\">");
     for step in steps {
         let (name, at) = match &step.added {
-            Some(place) => (
-                format!("+ {}", effect_name(&place.effect)),
-                place.at.join(", "),
-            ),
-            None => ("The model as it is".into(), "fitted anew".into()),
+            Some(place) => (format!("+ {}", place.effect), place.at.join(", ")),
+            None => ("The model as it is".into(), "fitted again".into()),
         };
         out.push_str(&format!(
             "<div class=\"candidate\"><span class=\"name\"><b>{}</b><br><span class=\"soft\">{}\
-             </span></span>{}<span class=\"amount\"><b>{}</b><br><span class=\"soft\">{} fitted\
+             </span></span>{}<span class=\"amount\"><b>{}</b><br><span class=\"soft\">{} in the fit\
              </span></span></div>\n",
             escape(&name),
             identifier(&at),
             scale.bar(&[("error", step.nrmse_test), ("seen", step.nrmse_fit)]),
-            percent(step.nrmse_test),
-            percent(step.nrmse_fit),
+            text(&error(step.nrmse_test)),
+            text(&error(step.nrmse_fit)),
         ));
     }
     out + "</div>\n"
@@ -147,8 +141,8 @@ fn rounds(diagnoses: &[Diagnosis]) -> String {
     let mut body = String::new();
     for (at, diagnosis) in tried.iter().enumerate() {
         let found = match &diagnosis.missing {
-            Some(place) => format!("found {}", place_name(place)),
-            None => "nothing that counts".into(),
+            Some(missing) => format!("found {}", place(missing)),
+            None => "found nothing that counts".into(),
         };
         let open = if at == 0 { " open" } else { "" };
         body.push_str(&format!(

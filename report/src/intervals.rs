@@ -1,7 +1,7 @@
 //! Confidence intervals of parameters, drawn to a common relative scale.
 
-use crate::html::{escape, identifier};
-use crate::numbers::{percent, quantity, with_error};
+use crate::html::{identifier, text};
+use crate::words::{percent, quantity, with_error};
 
 /// One parameter with an interval.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub(crate) fn can_be_drawn(interval: &Interval) -> bool {
     interval.relative().is_some()
 }
 
-/// A bar for each interval; those much wider than the others run off the scale, with an arrow.
+/// A bar for each interval. Those much wider than the others end at the rim, with an arrow.
 pub(crate) fn chart(intervals: &[Interval]) -> String {
     let half_widths: Vec<f64> = intervals
         .iter()
@@ -69,15 +69,15 @@ pub(crate) fn chart(intervals: &[Interval]) -> String {
              <path class=\"bar\" d=\"M{from:.2} 5H{to:.2}\"/>{}{}\
              <path class=\"value\" d=\"M50 1.5V8.5\"/></svg>\
              <span class=\"width\">±\u{a0}{}</span></div>\n",
-            escape(&interval.numbers()),
+            text(&interval.numbers()),
             identifier(interval.name),
-            escape(&interval.numbers()),
+            text(&interval.numbers()),
             arrow(ends[0] < -1.001 * scale, "M0 5L3 2V8Z"),
             arrow(ends[1] > 1.001 * scale, "M100 5L97 2V8Z"),
-            percent((ends[1] - ends[0]) / 2.0),
+            text(&percent((ends[1] - ends[0]) / 2.0)),
         ));
     }
-    let end = percent(scale);
+    let end = text(&percent(scale));
     out.push_str(&format!(
         "<div class=\"interval scale\"><span class=\"name\"></span><span class=\"ends\">\
          <span>−{end}</span><span>value</span><span>+{end}</span></span>\
@@ -136,7 +136,7 @@ mod tests {
         assert!(html.contains("d=\"M5.00 5H95.00\""), "{html}");
         assert!(html.contains("class=\"arrow\" d=\"M0 5") && html.contains("±\u{a0}1.0\u{a0}%"));
         assert!(
-            html.contains("K_A&lt; = −15.146\u{a0}1/s, 95 % interval −15.297"),
+            html.contains("K_A&lt; = −15.146\u{a0}1/s, 95\u{a0}% interval −15.297"),
             "{html}"
         );
     }

@@ -1,12 +1,51 @@
-//! What a person looks at: pages that show a model against measurements, a fit, what a model
-//! lacks, or a loop at work.
+//! Reports: pages that a person looks at, and results in words.
 //!
-//! [`comparison_page`], [`fit_page`], [`diagnosis_page`], [`improvement_page`] and [`run_page`] return the text of an HTML file that needs
-//! nothing but a browser: style, data and the charts' library (plotly.js) are inside, nothing is
-//! fetched. [`save`] writes it whole or not at all. [`figure_svg`] draws static pictures for texts.
+//! | page | shows |
+//! |---|---|
+//! | [`comparison_page`] | a model compared with measurements, and where it fails |
+//! | [`fit_page`] | parameters with intervals, and the fitted model compared with measurements |
+//! | [`diagnosis_page`] | which physical effect a model lacks, with the evidence |
+//! | [`improvement_page`] | the error as it falls, effect by effect |
+//! | [`run_page`] | a control loop at work |
 //!
-//! Numbers are thinned out and rounded for drawing only; what a page *says* is computed from every
-//! sample.
+//! A page is the text of an HTML file. Style, data and the charts' library (plotly.js) are inside, compressed, so
+//! it opens offline in any browser of 2023 or later. It fetches nothing and sends nothing. [`save`] writes it
+//! whole or not at all. [`figure_svg`] draws static pictures for texts.
+//!
+//! ```
+//! use loopsight_report::{Context, ControlledTrace, LoopRecord, run_page, save};
+//!
+//! // What a loop did, tick by tick, in SI units. Here: one signal, three ticks.
+//! let record = LoopRecord {
+//!     period_s: 0.01,
+//!     time: vec![0.0, 0.01, 0.02],
+//!     controlled: vec![ControlledTrace {
+//!         id: "speed".into(),
+//!         unit: "m/s".into(),
+//!         reference: vec![0.2, 0.2, 0.2],
+//!         measured: vec![0.0, 0.1, 0.18],
+//!         ideal: None,
+//!     }],
+//!     end: "the reference ended".into(),
+//!     ..LoopRecord::default()
+//! };
+//! let context = Context {
+//!     title: "First run".into(),
+//!     model_name: "Twil".into(),
+//!     ..Context::default()
+//! };
+//! let page = run_page(&context, &record);
+//! assert!(page.contains("The loop ran 3 ticks of 10\u{a0}ms, 0.03\u{a0}s in all."));
+//!
+//! let folder = tempfile::tempdir()?;
+//! save(&folder.path().join("run.html"), &page)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! What a page says is computed from every sample. Only what it draws is thinned out and rounded.
+//!
+//! All sentences are made in [`words`], as plain text. The command line prints the same ones, and JSON answers
+//! have them under `summary`.
 
 mod bars;
 mod beside;
@@ -32,19 +71,21 @@ mod run_figure;
 mod save;
 mod scatter;
 mod thin;
-mod words;
+mod typeset;
+pub mod words;
 
 #[cfg(test)]
 mod findings;
 #[cfg(test)]
 mod fixtures;
+#[cfg(test)]
+mod gallery;
 
 pub use comparison::comparison_page;
 pub use diagnosis::diagnosis_page;
 pub use figure::{Figure, FigurePanel, FigureTrace, Style, figure_svg};
 pub use fit::fit_page;
 pub use improvement::improvement_page;
-pub use numbers::ASTRAY;
 pub use page::Context;
 pub use record::{
     ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace, Timing,
@@ -52,3 +93,4 @@ pub use record::{
 pub use run::run_page;
 pub use run_figure::run_figure;
 pub use save::{ReportError, save};
+pub use words::ASTRAY;

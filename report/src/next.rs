@@ -1,10 +1,11 @@
 //! What to type next.
 
-use loopsight_diagnosis::{Conclusion, Diagnosis, Improvement, Place};
+use loopsight_diagnosis::{Conclusion, Diagnosis, Improvement};
 
-use crate::conclusion::{effect_name, found};
 use crate::html::escape;
 use crate::page::Context;
+use crate::words::diagnosis::found;
+use crate::words::place_to_type;
 
 /// A sentence and a command.
 type Hint = (String, String);
@@ -34,15 +35,14 @@ pub(crate) fn after_diagnosis(context: &Context, diagnosis: &Diagnosis) -> Vec<H
                 for other in &best.indistinguishable_from {
                     hints.push((
                         format!(
-                            "See whether an experiment can tell {} from {}, and plan it.",
-                            effect_name(&best.place.effect),
-                            effect_name(&other.effect)
+                            "Plan the experiment that tells {} from {}.",
+                            best.place.effect, other.effect
                         ),
                         format!(
                             "loopsight experiment {} --separate {} {} -o experiment.csv",
                             word(model),
-                            word(&at_channels(&best.place)),
-                            word(&at_channels(other))
+                            word(&place_to_type(&best.place)),
+                            word(&place_to_type(other))
                         ),
                     ));
                 }
@@ -59,10 +59,7 @@ pub(crate) fn after_diagnosis(context: &Context, diagnosis: &Diagnosis) -> Vec<H
                     format!(" --at{at}")
                 };
                 hints.push((
-                    format!(
-                        "Write a model file with {} in it.",
-                        effect_name(&best.place.effect)
-                    ),
+                    format!("Write a model file with {} added.", best.place.effect),
                     format!(
                         "loopsight add {} {}{at} -o {}",
                         word(model),
@@ -71,7 +68,7 @@ pub(crate) fn after_diagnosis(context: &Context, diagnosis: &Diagnosis) -> Vec<H
                     ),
                 ));
                 hints.push((
-                    "Fit it, and look at what is left.".into(),
+                    "Fit it, and look at what error is left.".into(),
                     format!(
                         "loopsight fit {} {}{} -o {} --html fit.html",
                         word(&new),
@@ -82,8 +79,8 @@ pub(crate) fn after_diagnosis(context: &Context, diagnosis: &Diagnosis) -> Vec<H
                 ));
             }
             let both = match files.model {
-                Some(_) => "Or let the program add and fit, until nothing more is missing.",
-                None => "Let the program add effects and fit, until nothing more is missing.",
+                Some(_) => "Or let loopsight add and fit until nothing more is missing.",
+                None => "Let loopsight add effects and fit until nothing more is missing.",
             };
             hints.push((
                 both.into(),
@@ -100,14 +97,14 @@ pub(crate) fn after_diagnosis(context: &Context, diagnosis: &Diagnosis) -> Vec<H
             hints
         }
         (Conclusion::NothingMissing, _) => vec![(
-            "The model is ready for what this recording exercises. Hold it against a recording of \
-             another kind: other speeds, turns, loads."
+            "The model is ready for what this log exercises. Diagnose it on a log of another kind: other \
+             speeds, turns, loads."
                 .into(),
             files.on_another("diagnose", "diagnosis.html"),
         )],
         (Conclusion::EffectMissing | Conclusion::UnknownEffect, _) => vec![(
-            "Record what is advised above and diagnose again; the charts above show what the \
-             residual depends on."
+            "Record what is advised above and diagnose again. The charts above show what the residual \
+             depends on."
                 .into(),
             files.on_another("diagnose", "diagnosis.html"),
         )],
@@ -128,12 +125,12 @@ pub(crate) fn after_improvement(context: &Context, improvement: &Improvement) ->
     let best = written.clone().unwrap_or_else(|| files.improved());
     if written.is_none() {
         hints.push((
-            "Write the best model into a file.".into(),
+            "Write the best model to a file.".into(),
             format!("loopsight improve {} -o {}", files.all(), word(&best)),
         ));
     }
     hints.push((
-        format!("Hold the improved model in {best} against a recording that it has not seen."),
+        format!("Compare the improved model in {best} with a log that it has not seen."),
         format!(
             "loopsight compare {} ANOTHER_LOG --html comparison.html",
             word(&best)
@@ -142,23 +139,14 @@ pub(crate) fn after_improvement(context: &Context, improvement: &Improvement) ->
     hints
 }
 
-/// `effect@channel+channel`.
-fn at_channels(place: &Place) -> String {
-    if place.at.is_empty() {
-        place.effect.clone()
-    } else {
-        format!("{}@{}", place.effect, place.at.join("+"))
-    }
-}
-
 fn again(files: &Files, verb: &str) -> Vec<Hint> {
     vec![
         (
-            "After recording again, see whether the new log is sound.".into(),
+            "Record again, and check the new log.".into(),
             "loopsight check NEW_LOG".into(),
         ),
         (
-            "Then try again with it.".into(),
+            "Then try again with the new log.".into(),
             files.on_another(verb, "page.html"),
         ),
     ]

@@ -1,6 +1,6 @@
 //! The frame of every page: head, style, scripts, footer.
 
-use crate::html::{escape, list};
+use crate::html::{escape, list, text};
 use crate::packed::library;
 
 const STYLE: &str = include_str!("../assets/page.css");
@@ -13,11 +13,11 @@ pub struct Context {
     pub title: String,
     /// Name of the robot.
     pub model_name: String,
-    /// The model's file; absent where the log brought its own model.
+    /// The model file; absent where the log brought its own model.
     pub model_file: Option<String>,
-    /// The log's file; may be empty.
+    /// The log file; may be empty.
     pub log_file: String,
-    /// Sentences to stand at the top.
+    /// Sentences to show at the top.
     pub notes: Vec<String>,
     /// The command that made the page.
     pub command: String,
@@ -68,7 +68,7 @@ pub(crate) fn section(title: &str, what: &str, body: &str) -> String {
     let what = if what.is_empty() {
         String::new()
     } else {
-        format!("<p class=\"what\">{}</p>\n", escape(what))
+        format!("<p class=\"what\">{}</p>\n", text(what))
     };
     format!(
         "<section>\n<h2>{}</h2>\n{what}{body}</section>\n",

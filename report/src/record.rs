@@ -5,9 +5,9 @@
 pub struct LoopRecord {
     /// Period of the loop, s.
     pub period_s: f64,
-    /// Ticks that were run; 0: as many as are kept.
+    /// Ticks that were run; 0 where all of them are kept.
     pub ticks: usize,
-    /// One in so many ticks is kept; 0 and 1: all are.
+    /// One in so many ticks is kept; 0 and 1 mean all.
     pub every: usize,
     /// Time of each tick since the start, s.
     pub time: Vec<f64>,
@@ -17,17 +17,15 @@ pub struct LoopRecord {
     pub inputs: Vec<InputTrace>,
     /// Ticks at which the controller wanted more than it could get.
     pub saturated: Vec<bool>,
-    /// Ticks whose measurement was older than the tick; empty: none.
+    /// Ticks whose measurement was older than the tick; empty where none was.
     pub stale: Vec<bool>,
-    /// Ticks at which the controller had the last good model instead of the learned one; empty:
-    /// none.
+    /// Ticks at which the controller had the last good model instead of the learned one; empty where none was.
     pub fallen: Vec<bool>,
     /// Estimated parameters; empty without an estimator.
     pub parameters: Vec<ParameterTrace>,
     /// Innovations of the estimator; empty without one.
     pub innovations: Vec<InnovationTrace>,
-    /// How much the least excited direction of each regression was excited; empty without an
-    /// estimator.
+    /// Excitation of each regression along the direction that is excited least; empty without an estimator.
     pub excitations: Vec<InnovationTrace>,
     /// How well real time was kept; `None` where time was simulated.
     pub timing: Option<Timing>,
@@ -35,7 +33,7 @@ pub struct LoopRecord {
     pub events: Vec<(f64, String)>,
     /// Sentences worth reading, e.g. the settling time asked for and the one reached.
     pub notes: Vec<String>,
-    /// Why the loop ended, in words; empty: not known.
+    /// Why the loop ended, in words; empty where it is not known.
     pub end: String,
 }
 
@@ -100,9 +98,9 @@ pub struct ControlledTrace {
     pub id: String,
     /// Its unit.
     pub unit: String,
-    /// What it should be.
+    /// Its reference.
     pub reference: Vec<f64>,
-    /// What it was.
+    /// Its measurement.
     pub measured: Vec<f64>,
     /// What the design promises: the response of the linear closed loop to the reference.
     pub ideal: Option<Vec<f64>>,
@@ -117,7 +115,7 @@ pub struct InputTrace {
     pub unit: String,
     /// What the controller asked for.
     pub commanded: Vec<f64>,
-    /// What was applied, after limits; empty: the same.
+    /// What was applied, after limits; empty where it is what was commanded.
     pub applied: Vec<f64>,
 }
 
@@ -134,14 +132,14 @@ pub struct ParameterTrace {
     pub std: Option<Vec<f64>>,
 }
 
-/// What the estimator did not expect.
+/// An innovation: the measurement minus what the estimator expected.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InnovationTrace {
     /// The output of the regression.
     pub id: String,
     /// Its unit; may be empty.
     pub unit: String,
-    /// Measurement less prediction.
+    /// The innovation.
     pub values: Vec<f64>,
 }
 

@@ -1,11 +1,12 @@
-//! The force that no effect of the library is: what it looks like, and an expression to begin with.
+//! A force that no effect of the library explains: what it looks like, and an expression to start from.
 
 use loopsight_diagnosis::{Bin, Curve, Dependence, ResidualForce};
 
 use crate::chart::{Abscissae, Chart, Role, Trace};
-use crate::html::{escape, marked, sentence};
-use crate::numbers::{axis, percent, significant};
+use crate::html::{escape, marked, sentence, text};
+use crate::numbers::axis;
 use crate::page::section;
+use crate::words::{percent, significant};
 
 /// Quantities that are drawn.
 const DRAWN: usize = 4;
@@ -31,7 +32,7 @@ pub(crate) fn residual_force(force: Option<&ResidualForce>) -> String {
             format!(
                 "<div><h3>{} <span class=\"soft\">{} of the variance</span></h3>{}</div>",
                 escape(&d.quantity),
-                percent(d.share_of_variance),
+                text(&percent(d.share_of_variance)),
                 chart(force, d).html()
             )
         })
@@ -39,22 +40,22 @@ pub(crate) fn residual_force(force: Option<&ResidualForce>) -> String {
     body.push_str(&format!("<div class=\"grid forces\">{charts}</div>\n"));
     body.push_str(&match &force.expression {
         Some(expression) => format!(
-            "<p>As an expression it begins with <code>{}</code>, which accounts for {} of the \
-             variance. Paste this at the end of the model file, fit, and look; then edit it until it \
-             says what it is:</p>\n<pre><code>{}</code></pre>\n",
+            "<p>The expression <code>{}</code> accounts for {} of the variance. Paste this at the end of the \
+             model file, fit, and look. Then edit it until it says what the force is:</p>\n\
+             <pre><code>{}</code></pre>\n",
             escape(&expression.force),
-            percent(expression.share_of_variance),
+            text(&percent(expression.share_of_variance)),
             escape(expression.toml.trim_end())
         ),
-        None => "<p>No expression in these quantities stands out from the noise: what is missing \
-                 depends on something that is not measured, or on the past.</p>\n"
+        None => "<p>No expression in these quantities stands out from the noise. What is missing depends on \
+                 something that is not measured, or on the past.</p>\n"
             .to_owned(),
     });
     section(
         "The force that is missing",
-        "What would have to act on the model, beside all it knows, to make it do what was measured. \
-         Points: the mean force over each quantity with its standard error, forwards and backwards. \
-         Lines: the expression below, over the same samples.",
+        "This force would have to act on the model, besides all that is in it, to make it do what was \
+         measured. Points are the mean force over each quantity with its standard error, forwards and \
+         backwards. Lines are the expression below, over the same samples.",
         &body,
     )
 }
@@ -152,7 +153,7 @@ mod tests {
         assert_eq!(residual_force(None), "");
         let html = opened(&residual_force(Some(&force())));
         for text in [
-            "The residual force at shaft depends on position: 62 % of its variance.",
+            "The residual force at shaft depends on position: 62\u{a0}% of its variance.",
             "position within a turn, rad",
             "force, V",
             "mean force, backwards",

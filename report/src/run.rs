@@ -1,29 +1,41 @@
 //! The page of a loop at work.
 
 use crate::chart::{Chart, Role};
+use crate::comparison::HOW_TO_LOOK;
 use crate::errors::rms;
-use crate::html::{escape, identifier, list, table};
-use crate::numbers::{axis, percent, plain, quantity, show};
+use crate::html::{identifier, list, table, text};
+use crate::numbers::axis;
 use crate::page::{Context, page, section};
-use crate::record::{LoopRecord, Timing};
+use crate::record::LoopRecord;
+use crate::words::run::{RunFigures, summary};
+use crate::words::{quantity, rounded};
 
 /// Lines for events; more would hide the traces.
 const MOST_EVENTS: usize = 60;
 
-/// The page of a closed loop: references, measurements and the response the design promises, the
-/// inputs with saturation, what the estimator learned, and what happened.
+/// The page of a control loop: references, measurements and the response that the design promises, the inputs
+/// with saturation, what the estimator learned, and what happened.
 pub fn run_page(context: &Context, record: &LoopRecord) -> String {
-    let mut body = format!("<p class=\"verdict\">{}</p>\n", escape(&sentence(record)));
+    let mut said = summary(&RunFigures::from(record));
+    if record.every > 1 {
+        said.push(format!(
+            "The run is long: one in {} ticks is shown here, the log has them all.",
+            record.every
+        ));
+    }
+    let mut body = format!("<p class=\"verdict\">{}</p>\n", text(&said.join(" ")));
     body.push_str(&list(&record.notes));
     body.push_str(&scores(record));
-    body.push_str(&section(
-        "Over time",
-        "Drag across a chart to zoom in, double-click to see all again; a tap on a legend entry \
-         shows or hides it. Shaded: the controller wanted more than it could get.",
-        &over_time(record).html(),
-    ));
+    if !record.time.is_empty() {
+        body.push_str(&section(
+            "Over time",
+            &format!("{HOW_TO_LOOK} Shaded: an input was saturated."),
+            &over_time(record).html(),
+        ));
+    }
     body.push_str(&events(record));
-    if !record.parameters.is_empty() || !record.innovations.is_empty() {
+    let learns = !record.parameters.is_empty() || !record.innovations.is_empty();
+    if learns && !record.time.is_empty() {
         body.push_str(&section(
             "What the estimator learned",
             &learned(record),
@@ -35,87 +47,29 @@ pub fn run_page(context: &Context, record: &LoopRecord) -> String {
 
 /// What stands above the estimator's charts.
 fn learned(record: &LoopRecord) -> String {
-    let mut text = "Parameters".to_owned();
+    let mut said = vec!["The parameters that were learned".to_owned()];
     if record.parameters.iter().any(|p| p.std.is_some()) {
-        text.push_str(" with a band of ± 2 standard deviations");
+        said[0].push_str(", with a band of ± 2 standard deviations");
     }
+    said[0].push('.');
     if record.fallen.contains(&true) {
-        text.push_str(" (shaded: the controller had the last good model instead)");
-    }
-    text.push_str("; below them the innovation: what each measurement told that was not expected");
-    if !record.excitations.is_empty() {
-        text.push_str(
-            ", and the excitation of the direction that is excited least: near zero nothing can \
-             be learned along it",
+        said.push(
+            "Shaded: the controller had the last good model instead of the learned one.".into(),
         );
     }
-    text.push_str(". Wild first guesses may be out of sight: double-click to see all.");
-    text
-}
-
-fn sentence(record: &LoopRecord) -> String {
-    let n = record.time.len();
-    if n == 0 {
-        return with_end("The loop did not complete a single tick.".into(), record);
+    if !record.innovations.is_empty() {
+        said.push(
+            "Below them the innovation: the measurement minus what the estimator expected.".into(),
+        );
     }
-    let ticks = record.ticks();
-    let mut text = format!(
-        "The loop ran for {} in {ticks} ticks of {}.",
-        quantity(&plain(ticks as f64 * record.period_s), "s"),
-        quantity(&plain(1000.0 * record.period_s), "ms"),
-    );
-    let share = |flags: &[bool]| {
-        let set = flags.iter().take(n).filter(|s| **s).count();
-        (set > 0).then(|| percent(set as f64 / n as f64))
-    };
-    text.push_str(&match share(&record.saturated) {
-        None => " The inputs never saturated.".to_owned(),
-        Some(share) => format!(" The inputs were saturated {share} of the time."),
-    });
-    if let Some(share) = share(&record.stale) {
-        text.push_str(&format!(" {share} of the samples were stale."));
+    if !record.excitations.is_empty() {
+        said.push(
+            "Then the excitation of the direction that is excited least. Near zero nothing can be learned along it."
+                .into(),
+        );
     }
-    if let Some(share) = share(&record.fallen) {
-        text.push_str(&format!(
-            " The last good model took the place of the learned one {share} of the time."
-        ));
-    }
-    if record.every > 1 {
-        text.push_str(&format!(
-            " It was long: one in {} ticks is kept here, all of them in the log.",
-            record.every
-        ));
-    }
-    if let Some(timing) = &record.timing {
-        text.push_str(&kept_time(timing, record.period_s, ticks));
-    }
-    with_end(text, record)
-}
-
-/// How well real time was kept.
-fn kept_time(timing: &Timing, period_s: f64, ticks: usize) -> String {
-    let ms = |seconds: f64| quantity(&show(1000.0 * seconds, 3), "ms");
-    let missed = match timing.missed {
-        0 => "none began more than a period late".to_owned(),
-        missed => format!("{missed} of {ticks} began more than a period late"),
-    };
-    format!(
-        " Real time: the periods differed from {} by {} (rms), the latest tick began {} late, {missed}; \
-         the longest took {}.",
-        ms(period_s),
-        ms(timing.jitter_s),
-        ms(timing.latest_s),
-        ms(timing.longest_s),
-    )
-}
-
-fn with_end(text: String, record: &LoopRecord) -> String {
-    let end = record.end.trim().trim_end_matches('.');
-    if end.is_empty() {
-        text
-    } else {
-        format!("{text} It ended: {end}.")
-    }
+    said.push("Wild first guesses may be out of sight: double-click to see everything.".into());
+    said.join(" ")
 }
 
 fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
@@ -133,8 +87,8 @@ fn scores(record: &LoopRecord) -> String {
         .iter()
         .map(|c| {
             let error = |of: &[f64]| {
-                escape(&quantity(
-                    &show(rms(difference(of, &c.measured)), 3),
+                text(&quantity(
+                    &rounded(rms(difference(of, &c.measured)), 3),
                     &c.unit,
                 ))
             };
@@ -144,7 +98,7 @@ fn scores(record: &LoopRecord) -> String {
             let mut row = vec![
                 identifier(&c.id),
                 error(&c.reference),
-                escape(&quantity(&show(largest, 3), &c.unit)),
+                text(&quantity(&rounded(largest, 3), &c.unit)),
             ];
             if ideal {
                 row.push(c.ideal.as_deref().map_or_else(|| "–".into(), error));
@@ -154,9 +108,9 @@ fn scores(record: &LoopRecord) -> String {
         .collect();
     let header = [
         "signal",
-        "from the reference (rms)",
-        "largest",
-        "from the ideal response (rms)",
+        "rms error",
+        "largest error",
+        "rms difference from the ideal response",
     ];
     table(
         &header[..if ideal { 4 } else { 3 }],
@@ -252,11 +206,11 @@ fn events(record: &LoopRecord) -> String {
         .iter()
         .take(MOST_EVENTS)
         .enumerate()
-        .map(|(at, (time, text))| {
+        .map(|(at, (time, what))| {
             vec![
                 (at + 1).to_string(),
-                quantity(&format!("{time:.2}"), "s"),
-                escape(text),
+                text(&quantity(&format!("{time:.2}"), "s")),
+                text(what),
             ]
         })
         .collect();
@@ -265,23 +219,28 @@ fn events(record: &LoopRecord) -> String {
         more => format!("<p>And {more} more.</p>\n"),
     };
     let table = table(&["", "time", "what happened"], &[true, true, false], &rows);
-    section("Events", "Numbered lines in the charts.", &(table + &more))
+    section(
+        "Events",
+        "The numbers are those of the lines in the charts.",
+        &(table + &more),
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::fixtures::{context, loop_record, opened, without_library};
+    use crate::record::Timing;
 
     #[test]
     fn the_page_says_and_shows() {
         let record = loop_record(1000);
         let page = opened(&run_page(&context(), &record));
         for text in [
-            "The loop ran for 10\u{a0}s in 1000 ticks of 10\u{a0}ms.",
-            "The inputs were saturated",
+            "The loop ran 1000 ticks of 10\u{a0}ms, 10\u{a0}s in all.",
+            "An input was saturated in",
             "It ended: the reference ended.",
-            "Settling time asked for 0.45 s",
+            "Settling time asked for 0.45\u{a0}s",
             "tracking error of linear_velocity, m/s",
             "\"shaded\":[[",
             "\"spread\":[",
@@ -309,13 +268,12 @@ mod tests {
         });
         let page = opened(&run_page(&context(), &record));
         for text in [
-            "The loop ran for 40\u{a0}s in 4000 ticks of 10\u{a0}ms.",
-            "% of the samples were stale",
-            "took the place of the learned one 10",
-            "one in 4 ticks is kept",
-            "by 0.123\u{a0}ms (rms), the latest tick began 4.20\u{a0}ms late, 3 of 4000 began",
+            "The loop ran 4000 ticks of 10\u{a0}ms, 40\u{a0}s in all.",
+            "The sample was stale in 5.00\u{a0}% of the ticks.",
+            "one in 4 ticks is shown here",
+            "jitter 0.123\u{a0}ms (rms), latest tick 4.20\u{a0}ms late",
             "excitation of linear_velocity, m/s²",
-            "shaded: the controller had the last good model",
+            "Shaded: the controller had the last good model",
         ] {
             assert!(page.contains(text), "{text}");
         }

@@ -18,7 +18,12 @@ pub enum ReportError {
     },
 }
 
-/// Writes `html` to `path`, whole or not at all: into a new file in the same folder, then renamed.
+/// Writes `html` to `path`, whole or not at all: into a new file in the same folder, which is then renamed.
+///
+/// # Errors
+///
+/// [`ReportError::Io`] where the folder does not exist, may not be written to, or has no space left, and where
+/// `path` is a folder.
 pub fn save(path: &Path, html: &str) -> Result<(), ReportError> {
     let error = |action| {
         move |source| ReportError::Io {

@@ -1,11 +1,12 @@
-//! Residuals against another quantity: a cloud of points and what they are on average.
+//! Residuals over another quantity: a cloud of points and its means.
 
 use loopsight_diagnosis::RunTrace;
 
 use crate::chart::{Abscissae, Chart, Role, Trace};
 use crate::errors::{residual, signal};
-use crate::numbers::{axis, significant};
+use crate::numbers::axis;
 use crate::thin::spread;
+use crate::words::significant;
 
 /// Most points of a cloud.
 const MOST_POINTS: usize = 3000;
@@ -37,7 +38,7 @@ pub(crate) fn bins(points: &[(f64, f64)]) -> Vec<Bin> {
     let Some(last) = sorted.len().checked_sub(1) else {
         return Vec::new();
     };
-    // A few outliers shall not widen the bins.
+    // A few outliers must not widen the bins.
     let at = |share: f64| sorted[(share * last as f64).round() as usize].0;
     let width = (at(0.99) - at(0.01)) / BINS;
     let key = |x: f64| match x {
@@ -62,8 +63,8 @@ pub(crate) fn bins(points: &[(f64, f64)]) -> Vec<Bin> {
         .collect()
 }
 
-/// A small chart for each quantity that the residual of signal `id` may depend on: the measured
-/// signals, then the inputs. Of the runs of another model, with its name, only the averages.
+/// A small chart for each quantity that the residual of signal `id` may depend on: the measured signals, then
+/// the inputs. `after` are the runs of another model with its name; of them only the means are drawn.
 pub(crate) fn charts(
     runs: &[RunTrace],
     after: Option<(&str, &[RunTrace])>,

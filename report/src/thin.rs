@@ -3,10 +3,10 @@
 /// Most points of one trace of a chart.
 pub(crate) const MOST_POINTS: usize = 4000;
 
-/// Indices of the samples to draw, in order: all of them, or at most `most` of which the first and
-/// the last are two, and the least and the greatest value of every stretch the others.
+/// Indices of the samples to draw, in order, at most `most`: the first, the last, and the least and the greatest
+/// value of every stretch.
 ///
-/// Where samples are missing (not finite), the first of each stretch stays, so that a gap shows.
+/// Where samples are missing (not finite), the first missing one of each stretch stays, so that a gap shows.
 pub(crate) fn kept(values: &[f64], most: usize) -> Vec<usize> {
     let n = values.len();
     if n <= most.max(2) {
@@ -32,8 +32,8 @@ pub(crate) fn kept(values: &[f64], most: usize) -> Vec<usize> {
     kept
 }
 
-/// At most `most` of `n` indices, in order: one from each of `most` equal stretches, not always at
-/// the same place in it, lest a periodic signal look as if it stood still.
+/// At most `most` of `n` indices, in order: one from each of `most` equal stretches. Its place in the stretch
+/// varies, so that a periodic signal does not look as if it stood still.
 pub(crate) fn spread(n: usize, most: usize) -> Vec<usize> {
     if n <= most {
         return (0..n).collect();

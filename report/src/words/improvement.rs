@@ -1,0 +1,179 @@
+//! What an improvement came to.
+
+use loopsight_diagnosis::{Conclusion, Improvement, Place, Step, Verdict};
+
+use super::diagnosis::{self, Said};
+use super::number::{error, hundredths};
+use super::place::{enumerated, place, place_in_brackets, place_in_table};
+use super::table::table;
+use super::{fit, force};
+
+/// What an improvement comes to, sentence by sentence; the first alone says the conclusion.
+pub fn summary(improvement: &Improvement) -> Vec<String> {
+    said(improvement).sentences()
+}
+
+/// What an improvement comes to, its parts apart.
+pub fn said(improvement: &Improvement) -> Said {
+    let Some(last) = improvement.diagnoses.last() else {
+        return Said {
+            headline: "There is no diagnosis.".into(),
+            ..Said::default()
+        };
+    };
+    let added = added(improvement);
+    let (Some(first), Some(end), false) = (
+        improvement.steps.first(),
+        improvement.steps.last(),
+        added.is_empty(),
+    ) else {
+        let mut said = diagnosis::said(last);
+        if improvement.verdict == Conclusion::Cancelled && last.verdict != Conclusion::Cancelled {
+            said.because
+                .push("The work was cancelled before it was added.".to_owned());
+        }
+        return said;
+    };
+    let names: Vec<String> = match added.as_slice() {
+        [one] => vec![place(one)],
+        several => several.iter().map(place_in_brackets).collect(),
+    };
+    let mut because = vec![format!(
+        "With {} the free-run error falls from {} to {}, on data that the model was not fitted to.",
+        if names.len() == 1 { "it" } else { "them" },
+        error(first.nrmse_test),
+        error(end.nrmse_test)
+    )];
+    because.push(rest(improvement.verdict, &error(last.floor.nrmse)));
+    because.extend(
+        last.observer
+            .as_ref()
+            .map(|observer| format!("Note: {}.", observer.statement)),
+    );
+    Said {
+        headline: format!("The model lacked {}.", enumerated(&names)),
+        because,
+        open: improvement
+            .steps
+            .iter()
+            .filter_map(|step| not_told(improvement, step))
+            .chain(not_pinned(improvement, &added))
+            .collect(),
+    }
+}
+
+/// What is still missing at the end.
+fn rest(verdict: Conclusion, floor: &str) -> String {
+    match verdict {
+        Conclusion::NothingMissing => {
+            format!("Nothing more is missing: noise and resolution alone would leave {floor}.")
+        }
+        Conclusion::UnknownEffect => format!(
+            "Noise and resolution alone would leave {floor}: something is still missing, and no effect of the \
+             library explains it."
+        ),
+        Conclusion::EffectMissing => format!(
+            "Noise and resolution alone would leave {floor}: more may be missing, but with still more effects \
+             any log can be fitted. The search stopped here."
+        ),
+        Conclusion::DataInsufficient | Conclusion::LogFaulty => {
+            "The log does not show what is left. The advice says what to record.".to_owned()
+        }
+        Conclusion::Cancelled => "The work was cancelled: more may be missing.".to_owned(),
+    }
+}
+
+/// The effects that an improvement has added: those of the best model, where there is one.
+pub fn added(improvement: &Improvement) -> Vec<Place> {
+    let before = improvement
+        .diagnoses
+        .first()
+        .and_then(|d| d.model.as_ref())
+        .map(|m| m.effects.len());
+    match (&improvement.best, before) {
+        (Some(best), Some(before)) => best
+            .model
+            .effects
+            .iter()
+            .skip(before)
+            .map(|effect| Place {
+                effect: effect.meta.id.to_owned(),
+                at: effect.at.iter().map(|c| c.id.to_owned()).collect(),
+            })
+            .collect(),
+        _ => improvement
+            .steps
+            .iter()
+            .filter_map(|s| s.added.clone())
+            .collect(),
+    }
+}
+
+/// What the data could not tell from the effect of a step.
+fn not_told(improvement: &Improvement, step: &Step) -> Option<String> {
+    let others: Vec<String> = improvement
+        .not_told_from(step)
+        .into_iter()
+        .map(place_in_brackets)
+        .collect();
+    let added = step.added.as_ref().filter(|_| !others.is_empty())?;
+    Some(format!(
+        "When {} was added, the data could not tell it from {}.",
+        place_in_brackets(added),
+        enumerated(&others)
+    ))
+}
+
+/// Which parameters of the added effects the data do not pin.
+fn not_pinned(improvement: &Improvement, added: &[Place]) -> Option<String> {
+    let of_effect = |name: &str| added.iter().any(|place| name.starts_with(&place.effect));
+    let names: Vec<&str> = improvement
+        .best
+        .iter()
+        .flat_map(|best| &best.parameters)
+        .filter(|(name, e)| of_effect(name) && doubtful(e.verdict))
+        .map(|(name, _)| name.as_str())
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "The log does not pin {}: the effect is likely, its size is not known. Another recording can tell.",
+            enumerated(&names)
+        )
+    })
+}
+
+/// Whether the data leave a parameter open.
+fn doubtful(verdict: Verdict) -> bool {
+    !matches!(verdict, Verdict::Good | Verdict::Held | Verdict::Unfinished)
+}
+
+/// An improvement for a terminal: the error step by step, summary, the force that is missing, and the best
+/// model's parameters.
+pub fn text(improvement: &Improvement) -> String {
+    let rows: Vec<Vec<String>> = improvement
+        .steps
+        .iter()
+        .map(|step| {
+            vec![
+                step.added.as_ref().map_or_else(
+                    || "the model as it is".to_owned(),
+                    |p| format!("+ {}", place_in_table(p)),
+                ),
+                hundredths(step.nrmse_fit),
+                hundredths(step.nrmse_test),
+            ]
+        })
+        .collect();
+    let mut text = String::new();
+    if !rows.is_empty() {
+        text = table(&["step", "error, fitted", "error, unseen"], &rows) + "\n";
+    }
+    text.push_str(&summary(improvement).join("\n"));
+    let last = improvement.diagnoses.last();
+    text.push_str(&force::text(last.and_then(|d| d.residual_force.as_ref())));
+    if let Some(best) = &improvement.best {
+        text.push_str("\n\n");
+        text.push_str(&fit::found(best));
+    }
+    text
+}
