@@ -69,7 +69,6 @@ impl Plant for Counted {
 declare_plant!(Counted, "counted_axis");
 
 const AXIS: &str = r#"
-[model]
 name = "axis"
 [plant.counted_axis]
 K_A = -2.5
@@ -84,36 +83,29 @@ column = "w"
 
 const FRICTION: &str = r#"
 [[effect]]
-at = ["shaft"]
 [effect.coulomb_friction]
+at = ["shaft"]
 level = 1.5
 "#;
 
-fn axis(more: &str) -> Model {
-    let text = format!("{AXIS}{more}")
-        .replace(
-            "K_A = -2.5",
-            if more.is_empty() {
-                "K_A = -2.5"
-            } else {
-                "K_A = -2.0"
-            },
-        )
-        .replace(
-            "K_C = 7.0",
-            if more.is_empty() {
-                "K_C = 7.0"
-            } else {
-                "K_C = 8.0"
-            },
-        );
-    Model::from_toml("axis.toml", &text).unwrap().0
+fn axis(k_a: f64, k_c: f64, more: &str) -> Model {
+    let text = AXIS
+        .replace("K_A = -2.5", &format!("K_A = {k_a:?}"))
+        .replace("K_C = 7.0", &format!("K_C = {k_c:?}"));
+    Model::from_toml("axis.toml", &format!("{text}{more}"))
+        .unwrap()
+        .0
 }
 
-/// Twelve seconds of an axis with dry friction.
+/// A model of the axis without friction, and somewhat off.
+fn rough() -> Model {
+    axis(-2.5, 7.0, "")
+}
+
+/// Eight seconds of an axis with dry friction.
 fn log() -> Run {
-    let truth = axis(FRICTION);
-    let time: Vec<f64> = (0..=1200).map(|k| 0.01 * f64::from(k)).collect();
+    let truth = axis(-2.0, 8.0, FRICTION);
+    let time: Vec<f64> = (0..=800).map(|k| 0.01 * f64::from(k)).collect();
     let settings = Simulated {
         seed: 3,
         quantize: false,
@@ -139,7 +131,7 @@ fn cancelled_at<T>(at: u64, work: impl Fn(&Work<'_>) -> T) -> (T, u64) {
 }
 
 /// Most evaluations after a cancellation: a few samples of the simulation in each thread, of which one
-/// of this log has 1200.
+/// of this log has 800.
 fn few() -> u64 {
     300 * rayon::current_num_threads() as u64
 }
@@ -168,7 +160,7 @@ fn error_of(model: &Model, run: &Run) -> f64 {
 #[test]
 fn a_comparison_ends() {
     let _one = counting();
-    let (model, runs) = (axis(""), [log()]);
+    let (model, runs) = (rough(), [log()]);
     let work = |w: &Work<'_>| compare(&model, &Measurements::new(&runs), w);
     at_random(1, 8, work, |result| {
         assert_eq!(result.unwrap_err(), CompareError::Cancelled(Cancelled));
@@ -178,7 +170,7 @@ fn a_comparison_ends() {
 #[test]
 fn a_fit_keeps_the_best_so_far() {
     let _one = counting();
-    let (model, run) = (axis(""), log());
+    let (model, run) = (rough(), log());
     let plain = error_of(&model, &run);
     let kept = AtomicU64::new(0);
     for method in [Method::OutputError, Method::Rls] {
@@ -198,7 +190,9 @@ fn a_fit_keeps_the_best_so_far() {
                 let error = error_of(&fit.model, &run);
                 if method == Method::OutputError {
                     assert!(error < 1.001 * plain, "{error} {plain}");
-                    assert!((error - fit.nrmse_fit).abs() < 0.01 * error);
+                    // A comparison finds the initial state again, and a better one.
+                    let share = error / fit.nrmse_fit;
+                    assert!((0.9..1.0001).contains(&share), "{share}");
                 }
             }
         });
@@ -224,28 +218,28 @@ fn sane(diagnosis: &Diagnosis, run: &Run) {
 #[test]
 fn a_diagnosis_keeps_what_was_judged() {
     let _one = counting();
-    let (model, run) = (axis(""), log());
+    let (model, run) = (rough(), log());
     let runs = std::slice::from_ref(&run);
     let work = |w: &Work<'_>| diagnose(&model, &Measurements::new(runs), w).unwrap();
     let found = work(&Work::quiet());
     assert_eq!(found.verdict, Conclusion::EffectMissing);
     let (fitted, judged) = (AtomicU64::new(0), AtomicU64::new(0));
-    at_random(3, 14, work, |diagnosis| {
+    at_random(3, 10, work, |diagnosis| {
         sane(&diagnosis, &run);
         fitted.fetch_add(u64::from(diagnosis.model.is_some()), Ordering::Relaxed);
         judged.fetch_add(diagnosis.candidates.len() as u64, Ordering::Relaxed);
     });
-    assert!(fitted.into_inner() > 7 && judged.into_inner() > 20);
+    assert!(fitted.into_inner() > 5 && judged.into_inner() > 10);
 }
 
 #[test]
 fn an_improvement_keeps_its_finished_steps() {
     let _one = counting();
-    let (model, run) = (axis(""), log());
+    let (model, run) = (rough(), log());
     let runs = std::slice::from_ref(&run);
     let work = |w: &Work<'_>| improve(&model, &Measurements::new(runs), w).unwrap();
     let steps = AtomicU64::new(0);
-    at_random(4, 10, work, |improvement| {
+    at_random(4, 7, work, |improvement| {
         assert_eq!(improvement.verdict, Conclusion::Cancelled);
         assert_eq!(improvement.best.is_some(), !improvement.steps.is_empty());
         if let Some(best) = &improvement.best {
@@ -259,7 +253,7 @@ fn an_improvement_keeps_its_finished_steps() {
 #[test]
 fn an_experiment_and_a_residual_force_end() {
     let _one = counting();
-    let (model, runs) = (axis(""), [log()]);
+    let (model, runs) = (rough(), [log()]);
     let limits = Limits {
         limit: 6.0,
         period: 0.01,
@@ -276,7 +270,7 @@ fn an_experiment_and_a_residual_force_end() {
 #[test]
 fn progress_comes_in_stages_that_end() {
     let _one = counting();
-    let (model, runs) = (axis(""), [log()]);
+    let (model, runs) = (rough(), [log()]);
     let told: Mutex<Vec<Progress>> = Mutex::new(Vec::new());
     let report = |progress: &Progress| told.lock().unwrap().push(*progress);
     diagnose(&model, &Measurements::new(&runs), &Work::reporting(&report)).unwrap();
