@@ -5,6 +5,7 @@ use loopsight_model::model::{Attached, Model, misfit};
 use loopsight_model::registry;
 use loopsight_model::sensor::Sensor;
 
+use crate::criteria::SearchCriteria;
 use crate::positions::Positions;
 
 /// An effect at a set of channels.
@@ -84,7 +85,7 @@ impl Candidate {
 
     /// Whether, with these `values`, one of its speeds drowns in the width over which its sign is
     /// smoothed: what is left of it then sharpens the sign, and is no effect of its own.
-    pub(crate) fn drowns(&self, values: &[f64]) -> bool {
+    pub(crate) fn drowns(&self, values: &[f64], criteria: &SearchCriteria) -> bool {
         let speeds = |width: bool| {
             self.own().filter_map(move |i| {
                 let declaration = &self.model.parameters[i].declaration;
@@ -94,7 +95,7 @@ impl Candidate {
             })
         };
         let width = speeds(true).fold(0.0, f64::max);
-        speeds(false).any(|speed| speed < CLEAR * width)
+        speeds(false).any(|speed| speed < criteria.clear_of_sign * width)
     }
 
     /// Its model with every sign, also of the effects that were there before, smoothed so widely that
@@ -129,7 +130,13 @@ impl Candidate {
 /// `rms` holds the root mean squares of the plant's signals in the recording: smoothing widths are
 /// set from it, since what suits a robot's wheels does not suit a flywheel. `held` says that an observer
 /// holds the free runs to the measurements.
-pub(crate) fn candidates(model: &Model, rms: &[f64], held: bool) -> Vec<Candidate> {
+pub(crate) fn candidates(
+    model: &Model,
+    rms: &[f64],
+    held: bool,
+    criteria: &SearchCriteria,
+) -> Vec<Candidate> {
+    let sign_width = criteria.sign_width;
     let mut found = Vec::new();
     for meta in registry::effects() {
         for at in channel_sets(model, meta) {
@@ -165,7 +172,7 @@ pub(crate) fn candidates(model: &Model, rms: &[f64], held: bool) -> Vec<Candidat
                 for set in *sets {
                     with = with.and_then(|m| m.with_effect(meta.id, set));
                     if let Some(model) = &mut with {
-                        flow = suit(model, rms).max(flow);
+                        flow = suit(model, rms, sign_width).max(flow);
                     }
                 }
                 if let Some(model) = with {
@@ -175,7 +182,7 @@ pub(crate) fn candidates(model: &Model, rms: &[f64], held: bool) -> Vec<Candidat
                         separate: *separate,
                         replaces: replaces.clone(),
                         by_position: !held && Positions::matter_to(meta),
-                        widths: widths(&model, rms),
+                        widths: widths(&model, rms, sign_width),
                         model,
                         flow,
                     });
@@ -186,17 +193,11 @@ pub(crate) fn candidates(model: &Model, rms: &[f64], held: bool) -> Vec<Candidat
     found
 }
 
-/// Share of the flow over which a sign is smoothed: wide enough for a fit to find its way.
-const WIDTH: f64 = 0.02;
-
-/// A speed that matters is so many times the width of a smoothed sign: `tanh(3)` is 0.995.
-const CLEAR: f64 = 3.0;
-
-/// Gives the last effect of `model` the widths that suit the recording; returns the root mean
+/// Gives the last effect of `model` the widths that suit the recording, `sign_width` times the flow; returns the root mean
 /// square of the flow at its channels.
-pub(crate) fn suit(model: &mut Model, rms: &[f64]) -> f64 {
+pub(crate) fn suit(model: &mut Model, rms: &[f64], sign_width: f64) -> f64 {
     let flow = model.effects.last().map_or(0.0, |e| flow(model, e, rms));
-    smooth(model, 1, WIDTH * flow);
+    smooth(model, 1, sign_width * flow);
     flow
 }
 
@@ -210,9 +211,9 @@ fn flow(model: &Model, effect: &Attached, rms: &[f64]) -> f64 {
 }
 
 /// The widths that suit the recording, of all effects that have one, by index of the parameter.
-fn widths(model: &Model, rms: &[f64]) -> Vec<(usize, f64)> {
+fn widths(model: &Model, rms: &[f64], sign_width: f64) -> Vec<(usize, f64)> {
     let of_effect = |effect: &Attached| {
-        let width = WIDTH * flow(model, effect, rms);
+        let width = sign_width * flow(model, effect, rms);
         let declarations = effect.meta.parameters.iter().enumerate();
         let first = effect.first_parameter;
         declarations

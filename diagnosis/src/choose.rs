@@ -1,16 +1,9 @@
 //! Which explanation comes first.
 
-use crate::conclude::{CLOSE, SAME};
 use crate::conclusion::{Explanation, Place};
+use crate::criteria::{ChoiceCriteria, Criteria};
 use crate::judge::{advantage, nrmse};
 use crate::trial::Judged;
-
-/// Share of what the best explanation leaves above the floor by which a smaller one may be worse.
-const BLUR: f64 = 0.3;
-
-/// An error so many times as large is not the same, whatever the statistics: where it lies in one
-/// transient, as after a payload was taken up, they have little to go by.
-const FAR: f64 = 1.5;
 
 /// The explanation that was put first.
 pub(crate) struct Chosen {
@@ -26,18 +19,26 @@ pub(crate) fn choose(
     finalists: &[Judged],
     floor: f64,
     earned: &dyn Fn(usize, &Explanation) -> bool,
+    criteria: &Criteria,
 ) -> Option<Chosen> {
+    let ChoiceCriteria {
+        same: same_advantage,
+        close,
+        blur,
+        never_same,
+    } = criteria.choice;
     finalists.first()?;
     let squared = |i: usize| nrmse(&finalists[i].rank).powi(2);
     let least = squared(0);
     // While the best explanation itself leaves much unexplained, small differences between
     // explanations are those of what else is missing.
-    let allowed = least + BLUR * (least - floor * floor).max(0.0);
+    let allowed = least + blur * (least - floor * floor).max(0.0);
     // No worse than another, by statistics or for all that can be done with it.
     let same = |i: usize, other: usize| {
         let (rank, other) = (&finalists[i].rank, &finalists[other].rank);
         let (error, least) = (nrmse(rank), nrmse(other));
-        error < CLOSE * least || error < FAR * least && advantage(rank, other) < SAME
+        let alike = || advantage(rank, other, &criteria.window) < same_advantage;
+        error < close * least || error < never_same * least && alike()
     };
     let not_worse: Vec<usize> = (0..finalists.len())
         .filter(|i| same(*i, 0) || squared(*i) < allowed)
@@ -70,7 +71,7 @@ pub(crate) fn choose(
     let unseen = |i: usize| nrmse(&finalists[i].losses);
     let id = |i: usize| finalists[i].candidate.meta.id;
     let as_well = |i: usize| {
-        let near = unseen(i) <= unseen(chosen) && error(i) < FAR * error(chosen);
+        let near = unseen(i) <= unseen(chosen) && error(i) < never_same * error(chosen);
         near && id(i) != id(chosen)
     };
     let class: Vec<Place> = (0..finalists.len())

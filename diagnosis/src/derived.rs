@@ -19,6 +19,8 @@ pub(crate) struct Known<'a> {
     pub(crate) undetermined: Vec<bool>,
     /// Quantile of the intervals, in standard errors.
     pub(crate) quantile: f64,
+    /// See [`ParameterCriteria::not_pinned`](crate::criteria::ParameterCriteria::not_pinned).
+    pub(crate) not_pinned: f64,
 }
 
 /// The quantities that the plant derives from its parameters, at the model's values.
@@ -90,7 +92,7 @@ fn estimate(unit: &str, value: f64, gradient: &[f64], known: Option<&Known<'_>>)
     estimate.std_error = Some(error);
     let half = known.quantile * error;
     estimate.interval95 = Some([value - half, value + half]);
-    estimate.verdict = if half > value.abs() {
+    estimate.verdict = if half > known.not_pinned * value.abs() {
         Verdict::NotPinned
     } else {
         Verdict::Good

@@ -4,8 +4,9 @@ use loopsight_model::model::Model;
 use loopsight_recordings::{Fault, Severity};
 
 use crate::candidates::candidates;
-use crate::conclude::{Evidence, LEAST, REPORTED, conclude};
+use crate::conclude::{Evidence, REPORTED, conclude};
 use crate::conclusion::{Conclusion, Diagnosis, Level};
+use crate::criteria::Criteria;
 use crate::error::FitError;
 use crate::explain::explain_look;
 use crate::fit::FitSettings;
@@ -38,7 +39,8 @@ pub fn diagnose(
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<Diagnosis, FitError> {
-    diagnose_above(model, measurements, LEAST, work)
+    let least = work.criteria().missing.least_share;
+    diagnose_above(model, measurements, least, work)
 }
 
 /// As [`diagnose`]; an explanation must account for `least` of the standard deviation.
@@ -50,7 +52,7 @@ pub(crate) fn diagnose_above(
 ) -> Result<Diagnosis, FitError> {
     // Cancelled until it is done: each step adds what it finds.
     let mut diagnosis = Diagnosis::begun(measurements.faults);
-    if refused(&mut diagnosis, model, measurements) {
+    if refused(&mut diagnosis, model, measurements, work.criteria()) {
         return Ok(diagnosis);
     }
     match steps(&mut diagnosis, model, measurements, least, work) {
@@ -80,13 +82,18 @@ impl Diagnosis {
 }
 
 /// Whether the measurements cannot carry the model: then that is the diagnosis.
-fn refused(diagnosis: &mut Diagnosis, model: &Model, measurements: &Measurements<'_>) -> bool {
+fn refused(
+    diagnosis: &mut Diagnosis,
+    model: &Model,
+    measurements: &Measurements<'_>,
+    criteria: &Criteria,
+) -> bool {
     let fatal = |fault: &Fault| fault.severity() == Severity::Fatal;
     if measurements.faults.iter().any(fatal) {
         diagnosis.verdict = Conclusion::LogFaulty;
         return true;
     }
-    diagnosis.advice = sufficiency::reasons(model, measurements.runs);
+    diagnosis.advice = sufficiency::reasons(model, measurements.runs, &criteria.log);
     if !diagnosis.advice.is_empty() {
         diagnosis.verdict = Conclusion::DataInsufficient;
         return true;
@@ -107,9 +114,10 @@ fn steps(
     let (model, runs) = (&*prepared.model, &*prepared.runs);
     let test = (measurements.test).map(|test| hold_alike(model, test, runs, work));
     let test = test.transpose()?;
-    let holdout = Holdout::new(model, runs, test.as_deref());
+    let criteria = work.criteria();
+    let holdout = Holdout::new(model, runs, test.as_deref(), &criteria.holdout);
     diagnosis.observer = Held::of(runs);
-    diagnosis.floor.nrmse = floor(model, test.as_deref().unwrap_or(runs));
+    diagnosis.floor.nrmse = floor(model, test.as_deref().unwrap_or(runs), &criteria.log);
 
     let plain = fit_plain(diagnosis, model, &holdout, work)?;
     let nominal = Nominal {
@@ -127,7 +135,7 @@ fn steps(
         unseen: &plain.judgement.losses,
         nominal_fit: diagnosis.nominal_fit,
         floor: diagnosis.floor.nrmse,
-        floor_fit: floor(model, runs),
+        floor_fit: floor(model, runs, &criteria.log),
         least,
     };
     let verdict = conclude(diagnosis, &finalists, &evidence);
@@ -220,7 +228,7 @@ fn search(
         work,
     )?;
     let held = diagnosis.observer.is_some();
-    let all = candidates(nominal.model, &rms, held);
+    let all = candidates(nominal.model, &rms, held, &work.criteria().search);
     let search = Search {
         all: &all,
         nominal,

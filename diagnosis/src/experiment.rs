@@ -42,6 +42,7 @@ use loopsight_model::model::Model;
 use loopsight_model::sensor::Sensor;
 use rayon::prelude::*;
 
+use crate::criteria::ExperimentCriteria;
 use crate::observer::unstable_at_rest;
 use crate::prediction::signal_rms;
 use crate::progress::{Cancelled, Stage, Work};
@@ -53,28 +54,12 @@ use shapes::Shape;
 
 /// Length at which experiments are compared, s.
 const HORIZON: f64 = 20.0;
-/// Shortest and longest experiment, s.
-const LENGTHS: (f64, f64) = (5.0, 600.0);
-/// Distance at which effects count as separated.
-const SEPARATED: f64 = 20.0;
-/// Value over standard error at which a parameter counts as pinned.
-const PINNED: f64 = 100.0;
-/// Share of an effect's own distance that a rival must leave: below it the models are the same but
-/// for the errors of their integration, and no robot is its model to that precision.
-const SAME: f64 = 0.02;
-/// A signal moves if its root mean square is so many times its noise.
-const MOVES: f64 = 5.0;
-/// Beyond this length nothing is separated, s.
-const HOPELESS: f64 = 1e5;
 /// Gauss–Newton steps at the first look, and for the best.
 const STEPS: (usize, usize) = (2, 8);
 /// Experiments that are looked at twice.
 const BEST: usize = 6;
 /// Longest integration step, s: far below what any sensor sees.
 const LOOK_STEP: f64 = 0.005;
-/// Noise of a sensor that says nothing about it, as a share of the signal's standard deviation.
-const NOISE: f64 = 0.01;
-
 /// Finds the experiment that answers `question` about `model`, within `limits`.
 ///
 /// # Errors
@@ -95,9 +80,14 @@ pub fn experiment(
         .min(limits.period.max(model.max_step));
     let design = Design::new(&model, *limits, work)?;
     match question {
-        Question::Separate(a, b) => {
-            design.separate(&rivals(&model, a, b.as_ref(), &design.rms, limits.limit)?)
-        }
+        Question::Separate(a, b) => design.separate(&rivals(
+            &model,
+            a,
+            b.as_ref(),
+            &design.rms,
+            limits.limit,
+            work.criteria(),
+        )?),
         Question::Pin(name) => design.pin(&[question::parameter(&model, name)?], true),
         Question::All => {
             let free: Vec<usize> = (0..model.parameters.len())
@@ -126,6 +116,7 @@ impl<'m> Design<'m> {
             Shape::usual(names.len()).drive(&names, limits.limit, limits.period, HORIZON)?;
         let values = model.values();
         let run = response(model, &values, &drive, work)?;
+        let noise = work.criteria().experiment.noise;
         let noise = (0..run.n_measured())
             .map(|i| match &model.measured[i].sensor {
                 Sensor::EncoderCounts(encoder) => encoder.noise(limits.period),
@@ -134,7 +125,7 @@ impl<'m> Design<'m> {
                         .map(|k| run.sample(k)[i].powi(2))
                         .sum::<f64>();
                     let std = (power / run.len().max(1) as f64).sqrt();
-                    if std > 0.0 { NOISE * std } else { NOISE }
+                    if std > 0.0 { noise * std } else { noise }
                 }
             })
             .collect();
@@ -152,6 +143,15 @@ impl<'m> Design<'m> {
             rms,
             work,
         })
+    }
+
+    fn criteria(&self) -> &'m ExperimentCriteria {
+        &self.work.criteria().experiment
+    }
+
+    /// A length within what an experiment may take, s.
+    fn allowed(&self, length: f64, longest: f64) -> f64 {
+        length.max(self.criteria().shortest_s).min(longest).ceil()
     }
 
     fn drive(&self, shape: Shape, duration: f64) -> Result<Drive, QuestionError> {
@@ -229,7 +229,8 @@ impl<'m> Design<'m> {
                     .map(|k| run.sample(k)[i].powi(2))
                     .sum::<f64>()
             };
-            let least = |i: usize| MOVES * self.noise[i] * (run.len() as f64).sqrt();
+            let least =
+                |i: usize| self.criteria().moves * self.noise[i] * (run.len() as f64).sqrt();
             Ok((0..run.n_measured())
                 .map(|i| power(i).sqrt() > least(i))
                 .collect())
@@ -249,6 +250,7 @@ impl<'m> Design<'m> {
     }
 
     fn separate(&self, rivals: &Rivals) -> Result<Plan, QuestionError> {
+        let criteria = self.criteria();
         let horizon = self.limits.duration.unwrap_or(HORIZON);
         let look = |shapes: &[Shape], steps: usize, starts: usize| {
             let done = AtomicU64::new(0);
@@ -280,17 +282,17 @@ impl<'m> Design<'m> {
         };
         let mut needed = self.needed(&apart, horizon);
         let mut duration = horizon;
-        let same = apart.share < SAME || needed > HOPELESS;
+        let same = apart.share < criteria.same || needed > criteria.hopeless_s;
         if self.limits.duration.is_none() && !same {
             // Refitted to a shorter recording a rival comes closer: once more at the new length.
-            let mut longest = LENGTHS.1;
+            let mut longest = criteria.longest_s;
             for _ in 0..6 {
-                duration = needed.clamp(LENGTHS.0, longest).ceil();
-                longest = (2.0 * duration).min(LENGTHS.1);
+                duration = self.allowed(needed, longest);
+                longest = (2.0 * duration).min(criteria.longest_s);
                 let drive = self.drive(shape, duration)?;
                 apart = self.distance(rivals, &drive, STEPS.1, usize::MAX)?;
                 needed = self.needed(&apart, duration);
-                if apart.total.sqrt() >= SEPARATED || duration >= LENGTHS.1 {
+                if apart.total.sqrt() >= criteria.separated || duration >= criteria.longest_s {
                     break;
                 }
             }
@@ -299,7 +301,7 @@ impl<'m> Design<'m> {
         let names = rivals.names();
         let (verdict, reason) = if same {
             (Promise::CannotBeSeparated, rivals.inseparable(apart.share))
-        } else if detectability >= SEPARATED {
+        } else if detectability >= criteria.separated {
             (
                 Promise::Answers,
                 format!(
@@ -312,8 +314,9 @@ impl<'m> Design<'m> {
             (
                 Promise::TooShort,
                 format!(
-                    "{}: the best found, but {names} come only {detectability:.1} standard deviations of the sensors' noise apart in {duration:.0} s, {SEPARATED} are needed to be sure: that takes about {needed:.0} s, a larger effect than {} or a finer sensor",
+                    "{}: the best found, but {names} come only {detectability:.1} standard deviations of the sensors' noise apart in {duration:.0} s, {} are needed to be sure: that takes about {needed:.0} s, a larger effect than {} or a finer sensor",
                     shape.name(),
+                    criteria.separated,
                     rivals.sizes,
                 ),
             )
@@ -339,7 +342,7 @@ impl<'m> Design<'m> {
 
     /// When the accumulated distance is enough, s.
     fn needed(&self, apart: &Apart, horizon: f64) -> f64 {
-        let enough = SEPARATED * SEPARATED;
+        let enough = self.criteria().separated.powi(2);
         let mut sum = 0.0;
         for (k, squared) in apart.by_sample.iter().enumerate() {
             sum += squared;
@@ -376,7 +379,7 @@ impl<'m> Design<'m> {
         let worst = |drive: &Drive| -> Result<(f64, usize), QuestionError> {
             let (model, noise) = (self.model, &self.noise);
             let known = information(model, &values, drive, &free, noise, self.work)?;
-            let errors = standard_errors(&known);
+            let errors = standard_errors(&known, self.criteria().flat);
             let worst = free
                 .iter()
                 .zip(&errors)
@@ -385,6 +388,7 @@ impl<'m> Design<'m> {
                 .max_by(|a, b| a.0.total_cmp(&b.0));
             Ok(worst.unwrap_or((f64::INFINITY, asked[0])))
         };
+        let criteria = self.criteria();
         let horizon = self.limits.duration.unwrap_or(HORIZON);
         let (shapes, done) = (self.moving()?, AtomicU64::new(0));
         let mut all: Vec<(Shape, (f64, usize))> = shapes
@@ -408,12 +412,12 @@ impl<'m> Design<'m> {
         };
         let hopeless = !error.is_finite();
         let mut duration = horizon;
-        let needed = |error: f64, duration: f64| duration * (error * PINNED).powi(2);
+        let needed = |error: f64, duration: f64| duration * (error * criteria.pinned).powi(2);
         if self.limits.duration.is_none() && !hopeless {
             for _ in 0..3 {
-                duration = needed(error, duration).clamp(LENGTHS.0, LENGTHS.1).ceil();
+                duration = self.allowed(needed(error, duration), criteria.longest_s);
                 (error, at) = worst(&self.drive(shape, duration)?)?;
-                if error * PINNED <= 1.0 || duration >= LENGTHS.1 {
+                if error * criteria.pinned <= 1.0 || duration >= criteria.longest_s {
                     break;
                 }
             }
@@ -442,7 +446,7 @@ impl<'m> Design<'m> {
                 reference(at),
             );
             // The prediction is no better than that.
-            if error * PINNED <= 1.1 {
+            if error * criteria.pinned <= criteria.pinned_about {
                 (Promise::Answers, text)
             } else {
                 let long = needed(error, duration);

@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::criteria::ParameterCriteria;
+
 /// A parameter among the unknowns of a fit.
 pub(crate) struct Named<'a> {
     pub(crate) name: &'a str,
@@ -21,16 +23,19 @@ pub(crate) struct Flatness {
     pub(crate) words: Vec<String>,
     vectors: DMatrix<f64>,
     values: DVector<f64>,
+    /// Eigenvalue, the square of a singular value, up to which a direction is flat.
+    least: f64,
 }
-
-/// A singular value of the column-normalised Jacobian below this: the direction is flat.
-const FLAT: f64 = 1e-6;
-/// A change of a parameter by its scale that moves the weighted outputs by less than this is dead.
-pub(crate) const DEAD: f64 = 1e-9;
 
 impl Flatness {
     /// Finds them from `JᵀJ` and its columns' norms; the first unknowns are the `named` ones.
-    pub(crate) fn of(gram: &DMatrix<f64>, norms: &[f64], named: &[Named<'_>]) -> Self {
+    pub(crate) fn of(
+        gram: &DMatrix<f64>,
+        norms: &[f64],
+        named: &[Named<'_>],
+        criteria: &ParameterCriteria,
+    ) -> Self {
+        let least = criteria.flat * criteria.flat;
         let n = norms.len();
         // The unknowns are balanced: a dead one is dead on the scale of its declaration.
         let dead: Vec<bool> = norms
@@ -38,7 +43,7 @@ impl Flatness {
             .enumerate()
             .map(|(i, norm)| {
                 let natural = named.get(i).map_or(1.0, |p| p.declared / p.scale);
-                *norm * natural <= DEAD || !norm.is_finite()
+                *norm * natural <= criteria.dead || !norm.is_finite()
             })
             .collect();
         let mut normalised = gram.clone();
@@ -55,14 +60,13 @@ impl Flatness {
         let mut flat = vec![false; n];
         let mut words = Vec::new();
         for (k, value) in eigen.eigenvalues.iter().enumerate() {
-            // Eigenvalues are squares of singular values.
-            if *value > FLAT * FLAT {
+            if *value > least {
                 continue;
             }
             let mut terms = Vec::new();
             for (i, parameter) in named.iter().enumerate() {
                 let share = eigen.eigenvectors[(i, k)];
-                if share.abs() > 0.1 {
+                if share.abs() > criteria.part_of_flat {
                     flat[i] = true;
                     let change = share / norms[i] * parameter.scale;
                     terms.push((parameter.name, change));
@@ -83,6 +87,7 @@ impl Flatness {
             words,
             vectors: eigen.eigenvectors,
             values: eigen.eigenvalues,
+            least,
         }
     }
 
@@ -91,7 +96,7 @@ impl Flatness {
         let n = norms.len();
         let mut inverse = DMatrix::zeros(n, n);
         for (k, value) in self.values.iter().enumerate() {
-            if *value > FLAT * FLAT {
+            if *value > self.least {
                 let v = self.vectors.column(k);
                 inverse += v * v.transpose() / *value;
             }

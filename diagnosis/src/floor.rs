@@ -4,6 +4,7 @@ use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
 
+use crate::criteria::LogCriteria;
 use crate::score::Tally;
 
 /// `nrmse` over all signals of a model without any fault.
@@ -15,14 +16,14 @@ use crate::score::Tally;
 /// something new (a bus that updates every 20 ms, a coarse scale) is late by anything between
 /// nothing and its hold time `h`: the differences are those of what is new, and the age adds
 /// `(rate · h)²/12`.
-pub(crate) fn floor(model: &Model, runs: &[Run]) -> f64 {
+pub(crate) fn floor(model: &Model, runs: &[Run], criteria: &LogCriteria) -> f64 {
     let n = model.measured.len();
     let sum: f64 = model
         .measured
         .iter()
         .enumerate()
         .map(|(signal, measured)| {
-            let (noise, std) = noise(&measured.sensor, signal, runs);
+            let (noise, std) = noise(&measured.sensor, signal, runs, criteria);
             let relative = noise / std;
             if relative.is_finite() {
                 relative * relative
@@ -35,7 +36,12 @@ pub(crate) fn floor(model: &Model, runs: &[Run]) -> f64 {
 }
 
 /// Standard deviations of the noise of the `signal`-th measured signal, and of the signal itself.
-pub(crate) fn noise(sensor: &Sensor, signal: usize, runs: &[Run]) -> (f64, f64) {
+pub(crate) fn noise(
+    sensor: &Sensor,
+    signal: usize,
+    runs: &[Run],
+    criteria: &LogCriteria,
+) -> (f64, f64) {
     let mut tally = Tally::default();
     let mut thirds = Vec::new();
     let mut holds = Vec::new();
@@ -75,7 +81,7 @@ pub(crate) fn noise(sensor: &Sensor, signal: usize, runs: &[Run]) -> (f64, f64) 
         Sensor::Instantaneous | Sensor::IntervalMean => {
             let white = median(thirds) / 0.6745 / 20f64.sqrt();
             let hold = median(holds);
-            let age = if hold > HELD * period {
+            let age = if hold > criteria.repeats_periods * period {
                 rate.rms() * hold / 12f64.sqrt()
             } else {
                 0.0
@@ -85,9 +91,6 @@ pub(crate) fn noise(sensor: &Sensor, signal: usize, runs: &[Run]) -> (f64, f64) 
     };
     (noise, tally.std())
 }
-
-/// A sensor that has something new so many sampling periods apart is held in between.
-const HELD: f64 = 1.5;
 
 fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
@@ -118,7 +121,7 @@ mod tests {
             .sum::<f64>()
             / f64::from(n);
         let run = Run::new("", time, Rows::default(), Rows::new(1, measured)).unwrap();
-        let (noise, _) = noise(&Sensor::Instantaneous, 0, &[run]);
+        let (noise, _) = noise(&Sensor::Instantaneous, 0, &[run], &LogCriteria::DEFAULT);
         assert!(
             (noise / left.sqrt() - 1.0).abs() < 0.1,
             "{noise} {}",

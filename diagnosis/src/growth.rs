@@ -2,22 +2,13 @@
 
 use nalgebra::DMatrix;
 
+use crate::criteria::FreeRunCriteria;
 use crate::observer::Step;
 
-/// An error of the state as large as its own deviation may become this many times as large, in
-/// deviations of what is measured, in a free run.
-const TOLERATED: f64 = 10.0;
-/// What has grown so much in the time of the whole horizon grows exponentially.
-const EXPONENTIAL: f64 = 3.0;
 /// Growth beyond which there is no need to look further.
 const CERTAINLY: f64 = 1e9;
-/// Share of what is followed at whose end errors must still be as large: others were a transient.
-const LATE: f64 = 0.1;
 /// Instants of a run from which errors are followed, as fractions of its length.
 const STARTS: [f64; 3] = [0.0, 0.25, 0.5];
-/// Share of the instants from which errors must grow.
-const MOSTLY: f64 = 0.5;
-
 /// The linearisations along a run.
 pub(crate) struct Path {
     time: Vec<f64>,
@@ -45,7 +36,7 @@ impl Path {
 }
 
 /// Whether errors grow exponentially along a path, by the eigenvalues of its transition.
-pub(crate) fn unstable(path: &Path) -> bool {
+pub(crate) fn unstable(path: &Path, criteria: &FreeRunCriteria) -> bool {
     let Some(first) = path.a.first() else {
         return false;
     };
@@ -57,7 +48,7 @@ pub(crate) fn unstable(path: &Path) -> bool {
             break;
         }
     }
-    radius(&transition, &vec![1.0; first.ncols()]) > EXPONENTIAL
+    radius(&transition, &vec![1.0; first.ncols()]) > criteria.exponential
 }
 
 /// How errors of the state grow where they grow too much.
@@ -73,8 +64,12 @@ pub(crate) struct Growth {
 
 impl Growth {
     /// Follows errors of the size of the states' deviations through `paths`; `None` where they stay
-    /// below [`TOLERATED`] times the `deviation` of each measured signal.
-    pub(crate) fn of(paths: &[Path], deviation: &[f64]) -> Option<Self> {
+    /// below so many times the `deviation` of each measured signal.
+    pub(crate) fn of(
+        paths: &[Path],
+        deviation: &[f64],
+        criteria: &FreeRunCriteria,
+    ) -> Option<Self> {
         let nx = paths.iter().find_map(|p| p.a.first())?.ncols();
         let size = deviations(paths, nx);
         let mut seen = vec![false; nx];
@@ -88,7 +83,8 @@ impl Growth {
                 followed += usize::from(first < path.a.len());
                 let mut grown = None;
                 let mut late = 0.0f64;
-                let ending = path.a.len() - ((path.a.len() - first) as f64 * LATE) as usize;
+                let ending =
+                    path.a.len() - ((path.a.len() - first) as f64 * criteria.late_share) as usize;
                 for k in first..path.a.len() {
                     let y = &path.c[k] * &m;
                     m = &path.a[k] * m;
@@ -102,7 +98,7 @@ impl Growth {
                             }
                         }
                     }
-                    if most > TOLERATED && grown.is_none() {
+                    if most > criteria.growth && grown.is_none() {
                         let time = path.time[k + 1] - path.time[first];
                         grown = Some((time, radius(&m, &size).ln() / time));
                     }
@@ -115,20 +111,20 @@ impl Growth {
                     }
                 }
                 // What a stiff loop makes of an error is large and soon over.
-                if let (Some((time, rate)), true) = (grown, late > TOLERATED) {
+                if let (Some((time, rate)), true) = (grown, late > criteria.growth) {
                     times.push(time);
                     rates.push(rate);
                 }
             }
         }
-        if times.is_empty() || (times.len() as f64) < MOSTLY * followed as f64 {
+        if times.is_empty() || (times.len() as f64) < criteria.starts_share * followed as f64 {
             return None;
         }
         let horizon = median(&mut times);
         let rate = median(&mut rates);
         Some(Self {
             horizon,
-            doubling: (rate * horizon > EXPONENTIAL.ln()).then(|| 2f64.ln() / rate),
+            doubling: (rate * horizon > criteria.exponential.ln()).then(|| 2f64.ln() / rate),
             observed: (0..nx).filter(|i| seen[*i]).collect(),
         })
     }
@@ -195,7 +191,14 @@ mod tests {
     fn what_dies_out_needs_no_help() {
         let decay = (-2.0 * PERIOD).exp();
         let damped = [1.0, PERIOD, 0.0, decay];
-        assert_eq!(Growth::of(&[path(damped, [1.0, 1.7])], &[0.7]), None);
+        assert_eq!(
+            Growth::of(
+                &[path(damped, [1.0, 1.7])],
+                &[0.7],
+                &FreeRunCriteria::DEFAULT
+            ),
+            None
+        );
     }
 
     /// A stiff oscillation makes a hundred units of speed of one of position, and dies out.
@@ -205,13 +208,21 @@ mod tests {
         let (sin, cos) = (rate * PERIOD).sin_cos();
         // The speed comes first: it is measured.
         let swing = [cos, -rate * sin, sin / rate, cos].map(|v| decay * v);
-        assert_eq!(Growth::of(&[path(swing, [1.0, 1.7])], &[0.7]), None);
+        assert_eq!(
+            Growth::of(
+                &[path(swing, [1.0, 1.7])],
+                &[0.7],
+                &FreeRunCriteria::DEFAULT
+            ),
+            None
+        );
     }
 
     #[test]
     fn a_double_integral_grows_with_time() {
         let free = [1.0, PERIOD, 0.0, 1.0];
-        let growth = Growth::of(&[path(free, [1.0, 1.7])], &[0.7]).unwrap();
+        let growth =
+            Growth::of(&[path(free, [1.0, 1.7])], &[0.7], &FreeRunCriteria::DEFAULT).unwrap();
         // An error of the speed as large as its deviation 1.7/√2 moves the position by 7 after:
         let expected = 7.0 * 2f64.sqrt() / 1.7;
         assert!((growth.horizon - expected).abs() < 0.1, "{growth:?}");
@@ -223,7 +234,12 @@ mod tests {
     fn an_unstable_mode_tells_its_rate() {
         let rate = 3.0f64;
         let grow = (rate * PERIOD).exp();
-        let growth = Growth::of(&[path([grow, 0.0, 0.0, 1.0], [1.0, 1.7])], &[0.7]).unwrap();
+        let growth = Growth::of(
+            &[path([grow, 0.0, 0.0, 1.0], [1.0, 1.7])],
+            &[0.7],
+            &FreeRunCriteria::DEFAULT,
+        )
+        .unwrap();
         assert!(
             (growth.horizon - 10f64.ln() / rate).abs() < 0.02,
             "{growth:?}"

@@ -3,6 +3,7 @@
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 
+use crate::criteria::HoldoutCriteria;
 use crate::judge::Losses;
 use crate::prediction::{InitialStates, predict};
 use crate::problem::Solution;
@@ -21,23 +22,29 @@ pub(crate) struct Holdout<'a> {
     std_fit: Vec<f64>,
 }
 
-/// Shortest and longest block, s: shorter than levels of an input are mostly held, for what a fit saw
-/// nothing of says how well it extrapolates, not what is missing.
-const BLOCK: (f64, f64) = (0.5, 2.5);
-
 impl<'a> Holdout<'a> {
-    /// With `test`, all of `runs` is seen and `test` judges. Without, every fourth block of each run
+    /// With `test`, all of `runs` is seen and `test` judges. Without, every so many blocks one of each run
     /// judges, another one in each run, never the first, which the initial state needs: the free run goes on through it, so delays, friction and
     /// slow changes are judged in motion and over the whole length.
-    pub(crate) fn new(model: &Model, runs: &'a [Run], test: Option<&'a [Run]>) -> Self {
+    pub(crate) fn new(
+        model: &Model,
+        runs: &'a [Run],
+        test: Option<&'a [Run]>,
+        criteria: &HoldoutCriteria,
+    ) -> Self {
+        let every = criteria.every.max(2);
         let seen = test.is_none().then(|| {
             runs.iter()
                 .enumerate()
                 .map(|(index, run)| {
-                    let block = (run.duration() / 16.0).clamp(BLOCK.0, BLOCK.1);
+                    let block = (run.duration() / criteria.blocks as f64)
+                        .max(criteria.shortest_s)
+                        .min(criteria.longest_s);
                     run.time()
                         .iter()
-                        .map(|t| t < &block || !((t / block) as usize + index).is_multiple_of(4))
+                        .map(|t| {
+                            t < &block || !((t / block) as usize + index).is_multiple_of(every)
+                        })
                         .collect()
                 })
                 .collect::<Vec<Vec<bool>>>()

@@ -3,7 +3,6 @@
 use loopsight_model::model::Model;
 use serde::Serialize;
 
-use crate::conclude::LEAST;
 use crate::conclusion::{Conclusion, Diagnosis, Explanation, Place};
 use crate::diagnose::diagnose_above;
 use crate::error::FitError;
@@ -58,12 +57,6 @@ impl Improvement {
     }
 }
 
-/// Share of the first error that a further effect must account for: beyond it a library finds
-/// something for every wiggle.
-const WORTH: f64 = 0.04;
-/// Most effects that are added: beyond that a library is fitting, not explaining.
-const MOST: usize = 6;
-
 /// Repeats [`diagnose`](crate::diagnose()), adding what it finds missing, until it finds nothing more.
 ///
 /// An improvement that is cancelled has the steps that were finished, the model of the last one as the
@@ -83,7 +76,7 @@ pub fn improve(
         let verdict = diagnosis.verdict;
         let round = state.diagnoses.len();
         let next = match (&diagnosis.missing, diagnosis.candidates.first()) {
-            (Some(_), Some(best)) if round < MOST => Some(best.clone()),
+            (Some(_), Some(best)) if round < work.criteria().improve.most => Some(best.clone()),
             _ => None,
         };
         state.diagnoses.push(diagnosis);
@@ -120,7 +113,9 @@ impl State {
     ) -> Result<Diagnosis, FitError> {
         let round = self.diagnoses.len();
         let first = self.diagnoses.first().map(|d| d.nominal.nrmse);
-        let least = first.map_or(LEAST, |nrmse| (WORTH * nrmse).max(LEAST));
+        let criteria = work.criteria();
+        let (worth, least) = (criteria.improve.worth, criteria.missing.least_share);
+        let least = first.map_or(least, |nrmse| (worth * nrmse).max(least));
         let diagnosis = diagnose_above(&self.present, measurements, least, &work.in_round(round))?;
         if let Some(fitted) = &diagnosis.model
             && self.steps.is_empty()

@@ -1,6 +1,8 @@
 //! Which of two models explains held-out data better, and whether that means anything.
 
+use crate::criteria::WindowCriteria;
 use crate::progress::{Cancelled, Work};
+use crate::window;
 
 /// Weighted squared errors of the samples that judge, in time order; runs stand one after the
 /// other.
@@ -9,14 +11,14 @@ pub(crate) type Losses = Vec<f64>;
 /// Mean difference of two loss series over its standard error (F. X. Diebold, R. S. Mariano, 1995,
 /// "Comparing predictive accuracy", Journal of Business & Economic Statistics 13, 253–263, with
 /// Bartlett's window): positive where `b` is the better one.
-pub(crate) fn advantage(a: &Losses, b: &Losses) -> f64 {
+pub(crate) fn advantage(a: &Losses, b: &Losses, criteria: &WindowCriteria) -> f64 {
     let n = a.len().min(b.len());
     if n < 8 {
         return 0.0;
     }
     let differences: Vec<f64> = a.iter().zip(b).map(|(x, y)| x - y).collect();
     let mean = differences.iter().sum::<f64>() / n as f64;
-    let lags = ((n as f64).sqrt() as usize).min(100);
+    let lags = window::lags(criteria.advantage_lags, n, criteria.advantage_most);
     let gamma = |lag: usize| {
         differences[lag..]
             .iter()
@@ -26,8 +28,8 @@ pub(crate) fn advantage(a: &Losses, b: &Losses) -> f64 {
             / n as f64
     };
     let mut variance = gamma(0);
-    for lag in 1..=lags {
-        variance += 2.0 * (1.0 - lag as f64 / (lags + 1) as f64) * gamma(lag);
+    for lag in 1..=lags.min(n - 1) {
+        variance += 2.0 * window::bartlett(lag, lags) * gamma(lag);
     }
     let error = (variance.max(0.0) / n as f64).sqrt();
     if error > 0.0 {
@@ -62,7 +64,7 @@ fn independent(losses: &Losses, work: &Work<'_>) -> Result<f64, Cancelled> {
         return Ok(1.0);
     }
     let mean = losses.iter().sum::<f64>() / n as f64;
-    let lags = (2.0 * (n as f64).sqrt()) as usize;
+    let lags = window::lags(work.criteria().window.independence_lags, n, usize::MAX);
     let gamma = |lag: usize| {
         losses[lag..]
             .iter()
@@ -77,7 +79,7 @@ fn independent(losses: &Losses, work: &Work<'_>) -> Result<f64, Cancelled> {
     let mut time = 1.0;
     for lag in 1..=lags.min(n - 1) {
         work.go_on()?;
-        time += 2.0 * (1.0 - lag as f64 / (lags + 1) as f64) * gamma(lag) / variance;
+        time += 2.0 * window::bartlett(lag, lags) * gamma(lag) / variance;
     }
     Ok(n as f64 / time.max(1.0))
 }
@@ -109,7 +111,7 @@ mod tests {
         for seed in 0..200 {
             let a: Losses = noise(1000, 2 * seed + 1).iter().map(|e| e * e).collect();
             let b: Losses = noise(1000, 2 * seed + 2).iter().map(|e| e * e).collect();
-            if advantage(&a, &b).abs() > 1.96 {
+            if advantage(&a, &b, &WindowCriteria::DEFAULT).abs() > 1.96 {
                 beyond += 1;
             }
         }
@@ -120,7 +122,7 @@ mod tests {
     fn a_smaller_error_wins() {
         let a: Losses = noise(1000, 1).iter().map(|e| (1.2 * e).powi(2)).collect();
         let b: Losses = noise(1000, 2).iter().map(|e| e * e).collect();
-        assert!(advantage(&a, &b) > 4.0);
-        assert!(advantage(&b, &a) < -4.0);
+        assert!(advantage(&a, &b, &WindowCriteria::DEFAULT) > 4.0);
+        assert!(advantage(&b, &a, &WindowCriteria::DEFAULT) < -4.0);
     }
 }

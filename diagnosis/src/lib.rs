@@ -7,6 +7,7 @@ mod choose;
 mod compare;
 mod conclude;
 mod conclusion;
+pub mod criteria;
 mod derived;
 mod diagnose;
 mod error;
@@ -42,10 +43,12 @@ mod sufficiency;
 pub mod tracking;
 mod trial;
 mod where_it_fails;
+mod window;
 
 pub use advice::Advice;
 pub use compare::{Comparison, RunTrace, SignalTrace, compare};
 pub use conclusion::{Conclusion, Diagnosis, Explanation, Level, Place};
+pub use criteria::{Criteria, Criterion, Reason};
 pub use diagnose::diagnose;
 pub use error::{CompareError, FitError};
 pub use experiment::{

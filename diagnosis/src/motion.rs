@@ -1,8 +1,5 @@
 //! The direction of motion that a measured signal tells.
 
-/// Below this share of its root mean square, a speed counts as rest.
-const REST: f64 = 0.05;
-
 /// What tells the direction of motion of a signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Motion {
@@ -43,14 +40,14 @@ impl Motion {
     }
 }
 
-/// The speed below which the samples count as rest.
-pub(crate) fn rest(speeds: impl Iterator<Item = f64>) -> f64 {
+/// The speed below which the samples count as rest: a `share` of its root mean square.
+pub(crate) fn rest(speeds: impl Iterator<Item = f64>, share: f64) -> f64 {
     let (mut n, mut squares) = (0.0f64, 0.0);
     for value in speeds.filter(|v| v.is_finite()) {
         n += 1.0;
         squares += value * value;
     }
-    REST * (squares / n.max(1.0)).sqrt()
+    share * (squares / n.max(1.0)).sqrt()
 }
 
 /// What tells the direction, sample by sample.
@@ -112,7 +109,7 @@ mod tests {
         let time: Vec<f64> = (0..40).map(|k| 0.05 * f64::from(k)).collect();
         let up_and_down: Vec<f64> = (0..40).map(|k| 1.0 - (f64::from(k) - 20.0).abs()).collect();
         let rates = speed(&time, &up_and_down, Motion::of("rad"));
-        assert_eq!(changes(&rates, rest(rates.iter().copied())).len(), 1);
+        assert_eq!(changes(&rates, rest(rates.iter().copied(), 0.05)).len(), 1);
         assert!(rates[3] > 0.0 && rates[36] < 0.0);
     }
 
@@ -124,7 +121,7 @@ mod tests {
         );
         assert_eq!(Motion::of("A").change(), "change of sign");
         assert_eq!(
-            rest([3.0, -4.0, f64::NAN].into_iter()),
+            rest([3.0, -4.0, f64::NAN].into_iter(), 0.05),
             0.05 * 12.5f64.sqrt()
         );
     }

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::progress::{Cancelled, Work};
+use crate::window::{bartlett, lags};
 
 /// A first-order noise model `e(k) = a e(k-1) + ε(k) + c ε(k-1)` with white `ε`.
 ///
@@ -169,7 +170,9 @@ pub(crate) fn covariance(
         })
         .collect::<Result<_, Cancelled>>()?;
     let samples: usize = runs.iter().flatten().map(|b| b.residual.len()).sum();
-    let lags = window(samples / n_signals.max(1));
+    let per_signal = samples / n_signals.max(1);
+    let criteria = &work.criteria().window;
+    let lags = lags(criteria.error_lags, per_signal, criteria.error_most).min(per_signal / 4);
     let columns = inverse_gram.ncols();
     let mut meat = DMatrix::<f64>::zeros(columns, columns);
     for blocks in runs {
@@ -190,7 +193,7 @@ pub(crate) fn covariance(
         meat += &scores * scores.transpose();
         for lag in 1..=lags.min(n.saturating_sub(1)) {
             work.go_on()?;
-            let weight = 1.0 - lag as f64 / (lags + 1) as f64;
+            let weight = bartlett(lag, lags);
             let product =
                 scores.columns(lag, n - lag) * scores.columns(0, n - lag).transpose() * weight;
             meat += product.transpose();
@@ -200,12 +203,6 @@ pub(crate) fn covariance(
     // Degrees of freedom that the fit has used up.
     meat *= samples as f64 / (samples.saturating_sub(unknowns)).max(1) as f64;
     Ok(inverse_gram * meat * inverse_gram)
-}
-
-/// Lags whose covariances are looked at, for `n` samples: Newey and West's `1.3 n^(1/2)` is cut at
-/// half a second of common sampling rates.
-fn window(n: usize) -> usize {
-    ((1.3 * (n as f64).sqrt()) as usize).min(50).min(n / 4)
 }
 
 #[cfg(test)]

@@ -106,9 +106,13 @@ pub(crate) fn growth(
     if runs.iter().any(|r| r.observer().is_some()) || values.iter().any(|v| !v.is_finite()) {
         return Ok(None);
     }
-    let design = Design::new(model, values, runs);
+    let design = Design::new(model, values, runs, work);
     let paths = design.paths(runs, work)?;
-    Ok(Growth::of(&paths, &design.deviation))
+    Ok(Growth::of(
+        &paths,
+        &design.deviation,
+        &work.criteria().free_run,
+    ))
 }
 
 /// Whether `model` leaves its rest by itself within the instants `time`, at inputs of zero.
@@ -131,8 +135,9 @@ pub(crate) fn unstable_at_rest(
         return Ok(false);
     };
     let rest = [rest];
-    let design = Design::new(model, values, &rest);
-    Ok(design.paths(&rest, work)?.iter().any(unstable))
+    let design = Design::new(model, values, &rest, work);
+    let (paths, criteria) = (design.paths(&rest, work)?, &work.criteria().free_run);
+    Ok(paths.iter().any(|path| unstable(path, criteria)))
 }
 
 /// `runs` with the observer that suits `growth`.
@@ -143,7 +148,7 @@ pub(crate) fn hold_with<'r>(
     growth: &Growth,
     work: &Work<'_>,
 ) -> Result<Cow<'r, [Run]>, Cancelled> {
-    let design = Design::new(model, values, runs);
+    let design = Design::new(model, values, runs, work);
     let mut held = Vec::with_capacity(runs.len());
     for run in runs {
         match design.hold(run, growth, work)? {
@@ -183,7 +188,8 @@ struct Design<'a> {
 }
 
 impl<'a> Design<'a> {
-    fn new(model: &Model, values: &'a [f64], runs: &[Run]) -> Self {
+    fn new(model: &Model, values: &'a [f64], runs: &[Run], work: &Work<'_>) -> Self {
+        let criteria = &work.criteria().log;
         let mut model = model.clone();
         model
             .effects
@@ -191,7 +197,7 @@ impl<'a> Design<'a> {
         let mut deviation = Vec::new();
         let mut noise = Vec::new();
         for (signal, measured) in model.measured.iter().enumerate() {
-            let (sensor, std) = floor::noise(&measured.sensor, signal, runs);
+            let (sensor, std) = floor::noise(&measured.sensor, signal, runs, criteria);
             noise.push(sensor.max(LEAST_NOISE * std).max(f64::MIN_POSITIVE));
             deviation.push(std);
         }

@@ -152,9 +152,6 @@ fn first_values(
     }
 }
 
-/// Rows of a Jacobian beyond this multiple of the median row are cut to it.
-const STEEP: f64 = 100.0;
-
 /// Norms of the rows, and the one in the middle of those that are not zero.
 fn row_norms(jacobian: &DMatrix<f64>) -> (Vec<f64>, f64) {
     let norms: Vec<f64> = jacobian.row_iter().map(|row| row.norm()).collect();
@@ -169,9 +166,9 @@ fn row_norms(jacobian: &DMatrix<f64>) -> (Vec<f64>, f64) {
 
 /// A shaft about to break loose is a switch: at that instant the free run answers to its parameters
 /// without bound, all of them alike, and one such row would hide what the others tell.
-fn limit_rows(jacobian: &mut DMatrix<f64>) {
+fn limit_rows(jacobian: &mut DMatrix<f64>, steep: f64) {
     let (norms, median) = row_norms(jacobian);
-    let limit = STEEP * median;
+    let limit = steep * median;
     for (mut row, norm) in jacobian.row_iter_mut().zip(norms) {
         if norm > limit {
             row *= limit / norm;
@@ -199,13 +196,14 @@ impl Problem<'_> {
             }
         }
         let (residual, mut jacobian) = self.linearise(solution)?;
-        limit_rows(&mut jacobian);
+        let criteria = &self.work.criteria().parameters;
+        limit_rows(&mut jacobian, criteria.steep);
         let gram = jacobian.tr_mul(&jacobian);
         let norms: Vec<f64> = (0..gram.ncols()).map(|i| gram[(i, i)].sqrt()).collect();
         let quantile = StudentsT::new(0.0, 1.0, (self.samples - norms.len() as f64).max(1.0))
-            .map_or(1.96, |t| t.inverse_cdf(0.975));
+            .map_or(1.96, |t| t.inverse_cdf(criteria.quantile));
 
-        let flatness = Flatness::of(&gram, &norms, &self.named());
+        let flatness = Flatness::of(&gram, &norms, &self.named(), criteria);
         let blocks = self.blocks(&residual, &jacobian);
         let inverse = flatness.inverse(&norms);
         let n_signals = self.model.measured.len();
@@ -237,14 +235,14 @@ impl Problem<'_> {
                         (value + quantile * error).min(high),
                     ]);
                 }
-                let margin = 1e-4 * parameter.scale();
+                let margin = criteria.at_bound * parameter.scale();
                 estimate.verdict = if flatness.dead[k] {
                     Verdict::Dead
                 } else if flatness.flat[k] {
                     Verdict::Flat
                 } else if value - low < margin || high - value < margin {
                     Verdict::AtBound
-                } else if quantile * error > value.abs() {
+                } else if quantile * error > criteria.not_pinned * value.abs() {
                     Verdict::NotPinned
                 } else {
                     Verdict::Good
@@ -262,6 +260,7 @@ impl Problem<'_> {
                 .map(|k| flatness.dead[k] || flatness.flat[k])
                 .collect(),
             quantile,
+            not_pinned: criteria.not_pinned,
         };
         let error = self.best().map_or(f64::NAN, |(error, _)| error);
         Ok(Fit {

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::error::FitError;
 use crate::fit::FitSettings;
-use crate::flatness::{DEAD, Named};
+use crate::flatness::Named;
 use crate::noise::Block;
 use crate::positions::Positions;
 use crate::prediction::{
@@ -211,10 +211,11 @@ impl<'a> Problem<'a> {
     /// Scales the unknowns so that each moves the residuals alike, as the damping of the solver
     /// expects (J. J. Moré, 1978, "The Levenberg-Marquardt algorithm", section 6).
     pub(crate) fn balance(&mut self, mut scaled: DVector<f64>) -> Result<DVector<f64>, Cancelled> {
+        let dead = self.work.criteria().parameters.dead;
         let (residual, mut jacobian) = self.linearise(&scaled)?;
         for (i, mut column) in jacobian.column_iter_mut().enumerate() {
             let norm = column.norm();
-            if norm > DEAD && norm.is_finite() {
+            if norm > dead && norm.is_finite() {
                 self.scales[i] /= norm;
                 self.lower[i] *= norm;
                 self.upper[i] *= norm;

@@ -5,6 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 
+use crate::criteria::Criteria;
+
 /// What long work is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -92,7 +94,8 @@ pub struct Cancelled;
 
 type Report<'a> = &'a (dyn Fn(&Progress) + Sync);
 
-/// Long work, as the caller sees it: whom to tell how far it is, and what stops it.
+/// Long work, as the caller sees it: whom to tell how far it is, what stops it, and by which criteria it
+/// decides.
 ///
 /// ```
 /// use loopsight_diagnosis::{CancelToken, Work};
@@ -102,11 +105,23 @@ type Report<'a> = &'a (dyn Fn(&Progress) + Sync);
 /// let work = Work::reporting(&report).stopped_by(&token);
 /// # drop(work);
 /// ```
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub struct Work<'a> {
     report: Option<Report<'a>>,
     token: CancelToken,
     round: usize,
+    criteria: &'a Criteria,
+}
+
+impl Default for Work<'_> {
+    fn default() -> Self {
+        Self {
+            report: None,
+            token: CancelToken::new(),
+            round: 0,
+            criteria: &Criteria::DEFAULT,
+        }
+    }
 }
 
 impl std::fmt::Debug for Work<'_> {
@@ -140,17 +155,28 @@ impl<'a> Work<'a> {
         self
     }
 
+    /// The same work, decided by other `criteria` than the default ones.
+    #[must_use]
+    pub fn decided_by(mut self, criteria: &'a Criteria) -> Self {
+        self.criteria = criteria;
+        self
+    }
+
+    /// By what it decides.
+    pub fn criteria(&self) -> &'a Criteria {
+        self.criteria
+    }
+
     /// Whether it was cancelled.
     pub fn is_cancelled(&self) -> bool {
         self.token.is_cancelled()
     }
 
     /// A part of the work that tells nobody; the same token stops it.
-    pub(crate) fn silently(&self) -> Work<'static> {
-        Work {
+    pub(crate) fn silently(&self) -> Self {
+        Self {
             report: None,
-            token: self.token.clone(),
-            round: self.round,
+            ..self.clone()
         }
     }
 

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use crate::candidates::{is_width, smooth};
 use crate::compare::compare;
-use crate::conclude::CLOSE;
 use crate::conclusion::{Diagnosis, Place};
 use crate::error::FitError;
 use crate::fit::FitSettings;
@@ -41,6 +40,7 @@ pub(crate) fn refine(
 /// What an earlier step added goes where the error is the same without it: what looked like a dead zone
 /// may have been a part of the friction that was added after it.
 fn needless(best: &mut Refined<'_>, steps: &mut Vec<Step>) -> Result<(), FitError> {
+    let close = best.work.criteria().choice.close;
     loop {
         // The last is what was just found missing.
         let earlier = steps.iter().enumerate().take(steps.len().saturating_sub(1));
@@ -49,7 +49,7 @@ fn needless(best: &mut Refined<'_>, steps: &mut Vec<Step>) -> Result<(), FitErro
             instances.first()?;
             Some((index, without(best.model, &instances)?))
         });
-        match best.takes(candidates.collect(), CLOSE)? {
+        match best.takes(candidates.collect(), close)? {
             Some(index) => drop(steps.remove(index)),
             None => return Ok(()),
         }
@@ -68,6 +68,7 @@ fn without(model: &Model, effects: &[usize]) -> Option<Model> {
 /// what looked like breakaway friction may have been friction with a delay that was still missing.
 /// The step that added it is then one that added the simpler effect.
 fn simplified(best: &mut Refined<'_>, steps: &mut [Step]) -> Result<(), FitError> {
+    let criteria = &best.work.criteria().improve;
     for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
         let instances = instances(best.model, place);
         let Some(effect) = instances.first().map(|i| &best.model.effects[*i]) else {
@@ -80,7 +81,7 @@ fn simplified(best: &mut Refined<'_>, steps: &mut [Step]) -> Result<(), FitError
             });
             Some((*id, candidate?))
         });
-        if let Some(id) = best.takes(simpler.collect(), SIMPLER)? {
+        if let Some(id) = best.takes(simpler.collect(), criteria.simpler)? {
             id.clone_into(&mut place.effect);
         }
     }
@@ -94,6 +95,7 @@ fn reconsidered(
     steps: &mut [Step],
     diagnoses: &[Diagnosis],
 ) -> Result<(), FitError> {
+    let criteria = &best.work.criteria().improve;
     for step in steps {
         let class = diagnoses.get(step.round).and_then(|d| d.candidates.first());
         let Some(place) = step.added.as_mut() else {
@@ -102,7 +104,7 @@ fn reconsidered(
         let others = class.iter().flat_map(|c| &c.indistinguishable_from);
         let candidates =
             others.filter_map(|other| Some((other, exchanged(best.model, place, other)?)));
-        if let Some(other) = best.takes(candidates.collect(), BETTER)? {
+        if let Some(other) = best.takes(candidates.collect(), criteria.better)? {
             *place = other.clone();
         }
     }
@@ -193,11 +195,6 @@ fn instances(model: &Model, place: &Place) -> Vec<usize> {
         .collect()
 }
 
-/// How much the error may grow for a simpler explanation.
-const SIMPLER: f64 = 1.02;
-/// How much it must fall for another one: less may be what else is missing.
-const BETTER: f64 = 0.9;
-
 /// Iterations of a short fit.
 const SHORT: u64 = 20;
 
@@ -220,13 +217,12 @@ fn refitted(
     Ok((error, fitted.model))
 }
 
-/// How much the error must fall for a sign to be smoothed over half as much.
-const SHARPER: f64 = 0.99;
 /// Most halvings.
 const HALVINGS: usize = 3;
 
 /// The sign of the effect added last is smoothed over less and less while the error falls by it.
 fn sharpened(best: &mut Refined<'_>) -> Result<(), FitError> {
+    let criteria = &best.work.criteria().improve;
     for _ in 0..HALVINGS {
         let mut candidate = best.model.clone();
         let Some(effect) = candidate.effects.last() else {
@@ -240,7 +236,10 @@ fn sharpened(best: &mut Refined<'_>) -> Result<(), FitError> {
             .and_then(|i| candidate.parameters[first + i].value);
         let Some(width) = width else { break };
         smooth(&mut candidate, count, 0.5 * width);
-        if best.takes(vec![((), candidate)], SHARPER)?.is_none() {
+        if best
+            .takes(vec![((), candidate)], criteria.sharper)?
+            .is_none()
+        {
             break;
         }
     }

@@ -28,6 +28,7 @@ pub(crate) fn fit(
     settings: &FitSettings,
     work: &Work<'_>,
 ) -> Result<Fit, FitError> {
+    let criteria = &work.criteria().parameters;
     let mut regression = Regression::new(model, settings.scheme)?;
     let mut estimators = Vec::new();
     for row in 0..regression.len() {
@@ -79,7 +80,8 @@ pub(crate) fn fit(
         let n = estimator.theta().len();
         let dof = (sums[row].1 - n as f64).max(1.0);
         let variance = sums[row].0 / dof;
-        let quantile = StudentsT::new(0.0, 1.0, dof).map_or(1.96, |t| t.inverse_cdf(0.975));
+        let quantile =
+            StudentsT::new(0.0, 1.0, dof).map_or(1.96, |t| t.inverse_cdf(criteria.quantile));
         for (k, j) in regression.parameters(row).iter().enumerate() {
             let theta = estimator.theta()[k];
             let error = (variance * estimator.covariance(k, k)).max(0.0).sqrt();
@@ -96,7 +98,7 @@ pub(crate) fn fit(
                 interval95: Some([value - quantile * error, value + quantile * error]),
                 verdict: if !parameter.declaration.admits(value) {
                     Verdict::AtBound
-                } else if quantile * error > value.abs() {
+                } else if quantile * error > criteria.not_pinned * value.abs() {
                     Verdict::NotPinned
                 } else {
                     Verdict::Good

@@ -6,11 +6,6 @@ use crate::noise;
 use crate::problem::Problem;
 use crate::progress::Cancelled;
 
-/// A residual whose noise model has `c` below this and `a` within ±[`SLOW`] is rounded counts.
-const ROUNDED: f64 = -0.8;
-/// See [`ROUNDED`].
-const SLOW: f64 = 0.3;
-
 impl Problem<'_> {
     /// Turns to the second pass if the residuals at `solution` are rounded counts; returns where it
     /// starts.
@@ -20,6 +15,7 @@ impl Problem<'_> {
     ) -> Result<Option<DVector<f64>>, Cancelled> {
         let (residual, jacobian) = self.linearise(solution)?;
         let blocks = self.blocks(&residual, &jacobian);
+        let criteria = &self.work.criteria().parameters;
         let n_signals = self.weights.len();
         let rounding: Vec<f64> = (0..n_signals)
             .map(|signal| {
@@ -28,7 +24,7 @@ impl Problem<'_> {
                     .map(|b| b[signal].residual.as_slice())
                     .collect();
                 let model = noise::Arma::fit(&series, &self.work)?;
-                let rounded = model.c < ROUNDED && model.a.abs() < SLOW;
+                let rounded = model.c < criteria.rounded && model.a.abs() < criteria.rounded_slow;
                 Ok(if rounded { model.c } else { 0.0 })
             })
             .collect::<Result<_, Cancelled>>()?;

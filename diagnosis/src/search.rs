@@ -7,37 +7,13 @@ use loopsight_model::run::Run;
 use rayon::prelude::*;
 
 use crate::candidates::Candidate;
-use crate::conclude::CLOSE;
 use crate::conclusion::Explanation;
+use crate::criteria::{Criteria, SearchCriteria};
 use crate::explain::explain;
 use crate::judge::nrmse;
 use crate::progress::{Stage, Work};
 use crate::starts::{first_starts, grown_starts};
 use crate::trial::{Judged, Nominal, finish, look, promise};
-
-/// Candidates that are fitted to the end.
-const FINALISTS: usize = 9;
-/// What leaves more than so many times what the best leaves at a first look is among them only while there
-/// are fewer than [`IN_ANY_CASE`].
-const FAR: f64 = 3.0;
-/// See [`FAR`].
-const IN_ANY_CASE: usize = 4;
-/// Starts of candidates that promise most and are looked at.
-const LOOKED_AT: usize = 36;
-/// Starts of one candidate that are looked at.
-const STARTS: usize = 2;
-/// Places of one effect among the finalists.
-const SIBLINGS: usize = 2;
-/// Most starts of a candidate that is looked at from where a simpler one ended.
-const GROWN: usize = 3;
-/// A simpler candidate that leaves more than so many times the least that was seen is not grown: what it
-/// leaves is not what the larger one adds.
-const WORTH_GROWING: f64 = 2.0;
-/// An effect that leaves so many times what it leaves at another place is there, not here.
-const ELSEWHERE: f64 = 1.1;
-/// An effect at several channels alike is tried at each with its own parameters where it leaves less
-/// than this share of the error.
-const WORTH_DIVIDING: f64 = 0.8;
 
 /// A candidate by its index, and where to start it from.
 type Attempt = (usize, Vec<f64>);
@@ -70,7 +46,7 @@ impl Search<'_> {
             let looked = best_first(looked);
             return Found { finalists, looked };
         }
-        let contest = contest(looked);
+        let contest = contest(looked, self.work.criteria());
         let of = contest.len() as u64;
         let done = AtomicU64::new(0);
         self.work.tell(Stage::Finalists, 0, of);
@@ -90,6 +66,10 @@ impl Search<'_> {
             Vec::new()
         };
         Found { finalists, looked }
+    }
+
+    fn criteria(&self) -> &SearchCriteria {
+        &self.work.criteria().search
     }
 
     /// One more is done of a stage.
@@ -144,13 +124,14 @@ impl Search<'_> {
             })
             .collect();
         promising.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let criteria = self.criteria();
         // No effect with many starts may crowd the others out.
         let mut taken = vec![0; self.all.len()];
         promising.retain(|(_, (i, _))| {
             taken[*i] += 1;
-            taken[*i] <= STARTS
+            taken[*i] <= criteria.looks_each
         });
-        promising.truncate(LOOKED_AT);
+        promising.truncate(criteria.looks);
         promising.into_iter().map(|(_, attempt)| attempt).collect()
     }
 
@@ -186,6 +167,7 @@ impl Search<'_> {
         waiting: &mut Vec<Attempt>,
         duration: f64,
     ) -> Vec<Attempt> {
+        let criteria = self.criteria();
         let least_of_all = least(looked.iter().map(|(_, found)| found));
         let mut attempts = Vec::new();
         for (i, candidate) in self.all.iter().enumerate() {
@@ -199,12 +181,12 @@ impl Search<'_> {
             let places = looked.iter().map(|(_, found)| found).filter(|found| {
                 found.candidate.meta.id == simpler.candidate.meta.id && !found.candidate.separate
             });
-            let elsewhere = error > ELSEWHERE * least(places);
-            let divided = error < WORTH_DIVIDING * nrmse(self.nominal.rank);
+            let elsewhere = error > criteria.elsewhere * least(places);
+            let divided = error < criteria.worth_dividing * nrmse(self.nominal.rank);
             let starts = grown_starts(candidate, simpler, duration);
-            let worth = error < WORTH_GROWING * least_of_all
+            let worth = error < criteria.worth_growing * least_of_all
                 && (!candidate.separate || divided)
-                && starts.len() <= GROWN;
+                && starts.len() <= criteria.grown_starts;
             if elsewhere || worth {
                 waiting.retain(|(j, _)| i != *j);
             }
@@ -230,7 +212,8 @@ fn best_first(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
 }
 
 /// Those of the candidates looked at that are fitted to the end, the best first.
-fn contest(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
+fn contest(mut looked: Vec<(usize, Judged)>, criteria: &Criteria) -> Vec<Judged> {
+    let (close, criteria) = (criteria.choice.close, &criteria.search);
     looked.sort_by(|a, b| a.1.error().total_cmp(&b.1.error()));
     let mut finalists: Vec<Judged> = Vec::new();
     for k in 0..looked.len() {
@@ -239,21 +222,25 @@ fn contest(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
         // Of several starts of one candidate the best counts.
         let again = looked[..k].iter().any(|(j, _)| i == j);
         let needless = looked.iter().any(|(_, other)| {
-            spares(&other.candidate, &found.candidate) && other.error() < CLOSE * error
+            spares(&other.candidate, &found.candidate) && other.error() < close * error
         });
         let siblings: Vec<&Judged> = (finalists.iter())
             .filter(|j| j.candidate.meta.id == id)
             .collect();
         let elsewhere = siblings.first().is_some_and(|best| {
-            best.candidate.at != found.candidate.at && error > ELSEWHERE * best.error()
+            best.candidate.at != found.candidate.at && error > criteria.elsewhere * best.error()
         });
         // A special case of one that did well may only not have come to its end.
         let special = |j: &Judged| is_special(&found.candidate, &j.candidate);
         let best = finalists.first();
-        let far =
-            best.is_some_and(|best| error > FAR * best.error()) && !finalists.iter().any(special);
-        let places = if far { IN_ANY_CASE } else { FINALISTS };
-        let crowded = siblings.len() >= SIBLINGS || finalists.len() >= places;
+        let far = best.is_some_and(|best| error > criteria.behind * best.error())
+            && !finalists.iter().any(special);
+        let places = if far {
+            criteria.finalists_at_least
+        } else {
+            criteria.finalists
+        };
+        let crowded = siblings.len() >= criteria.finalists_each || finalists.len() >= places;
         if !again && !needless && !elsewhere && !crowded {
             finalists.push(found.clone());
         }

@@ -4,9 +4,7 @@ use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 
 use crate::advice::Advice;
-
-/// Least time with something moving, s.
-const LEAST_MOTION: f64 = 2.0;
+use crate::criteria::LogCriteria;
 
 /// Whether a measured signal changes in a run.
 fn moves(run: &Run) -> bool {
@@ -20,7 +18,8 @@ fn moves(run: &Run) -> bool {
 }
 
 /// Reasons why not; empty when it can.
-pub(crate) fn reasons(model: &Model, runs: &[Run]) -> Vec<Advice> {
+pub(crate) fn reasons(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Vec<Advice> {
+    let least = criteria.motion_s;
     let mut list = Vec::new();
     let mut say = |why: String, experiment: &str| {
         list.push(Advice {
@@ -29,14 +28,14 @@ pub(crate) fn reasons(model: &Model, runs: &[Run]) -> Vec<Advice> {
         });
     };
     let duration: f64 = runs.iter().map(Run::duration).sum();
-    if duration < LEAST_MOTION {
+    if duration < least {
         say(
             format!("the runs last {duration:.2} s in all"),
             "record at least ten times the slowest time constant, 20 s as a rule",
         );
     }
     let longest = runs.iter().map(Run::duration).fold(0.0, f64::max);
-    if (1.0..f64::INFINITY).contains(&duration) && longest < 1.0 {
+    if (criteria.run_s..f64::INFINITY).contains(&duration) && longest < criteria.run_s {
         say(
             format!("no run is longer than {longest:.2} s"),
             "record longer runs without a gap",
@@ -61,7 +60,7 @@ pub(crate) fn reasons(model: &Model, runs: &[Run]) -> Vec<Advice> {
         }
     }
     let moving: f64 = runs.iter().filter(|r| moves(r)).map(Run::duration).sum();
-    if moving > 0.0 && moving < LEAST_MOTION && duration >= LEAST_MOTION {
+    if moving > 0.0 && moving < least && duration >= least {
         say(
             format!(
                 "something moves in {moving:.2} s of {duration:.2} s only; in the other runs no measured signal changes"

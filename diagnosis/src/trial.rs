@@ -4,7 +4,7 @@ use loopsight_model::model::Model;
 use nalgebra::DVector;
 
 use crate::candidates::Candidate;
-use crate::conclude::SIGNIFICANT;
+use crate::criteria::SearchCriteria;
 use crate::fit::Fit;
 use crate::holdout::{Holdout, Judgement};
 use crate::judge::{Losses, nrmse, significance};
@@ -79,14 +79,6 @@ fn coarse(candidate: &Candidate, steps: f64) -> Model {
     model
 }
 
-/// Share of the cost that a regression must promise to leave less than: others begin a step away from
-/// the plain model, and may do worse at first.
-const PROMISING: f64 = 0.99;
-
-/// Share of the plain model's cost below which measured positions tell all there is, as where the
-/// position is what is measured.
-const TOLD: f64 = 0.1;
-
 /// The model without any candidate, fitted, and what every candidate is fitted to and judged on.
 pub(crate) struct Nominal<'a> {
     pub(crate) model: &'a Model,
@@ -101,6 +93,10 @@ pub(crate) struct Nominal<'a> {
 }
 
 impl<'a> Nominal<'a> {
+    fn criteria(&self) -> &'a SearchCriteria {
+        &self.work.criteria().search
+    }
+
     /// The problem of fitting `model` to what may be seen; with initial states that are `held`, or
     /// estimated. None where the work was cancelled.
     fn problem<'m>(&self, model: &'m Model, held: Option<&[DVector<f64>]>) -> Option<Problem<'m>>
@@ -133,11 +129,12 @@ pub(crate) fn promise(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_
     let mut problem = nominal.problem(&model, Some(states))?;
     problem.positions = positions(candidate, start);
     let (before, after) = problem.promise(start, states).ok()??;
+    let criteria = nominal.criteria();
     match shape {
         // With measured positions also the plain model leaves less than in its free run; where they leave
         // hardly anything, the regression says nothing.
         Some(_) => {
-            let promising = after < PROMISING * before || before < TOLD * plain;
+            let promising = after < criteria.promising * before || before < criteria.told * plain;
             promising.then(|| plain * after / before)
         }
         None => Some(after),
@@ -179,12 +176,14 @@ pub(crate) fn look(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) 
 /// None where no fit does, or the work was cancelled.
 pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     // The sharpest that can be.
-    let sharp = SHARP.iter().find_map(|share| {
+    let criteria = nominal.criteria();
+    let widths = [criteria.sharpest, criteria.sharp];
+    let sharp = widths.iter().find_map(|share| {
         let sharp = Judged {
             candidate: first.candidate.smoothed(*share)?,
             ..first.clone()
         };
-        fully(sharp, nominal, WILD)
+        fully(sharp, nominal, criteria.wild)
     });
     let broad = fully(first, nominal, f64::INFINITY);
     let error = |found: &(Judged, Fit)| found.0.error();
@@ -196,7 +195,7 @@ pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fi
         .and_then(|(judged, _)| {
             let soft = softer(judged.clone(), nominal)?;
             let sure = significance(&judged.rank, &soft.0.rank, nominal.work).ok()?;
-            (sure > SIGNIFICANT).then_some(soft)
+            (sure > nominal.work.criteria().missing.significant).then_some(soft)
         });
     // Of fits that were not all done none is the best.
     nominal.work.go_on().ok()?;
@@ -227,13 +226,6 @@ fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     Some((judged, fit))
 }
 
-/// Shares of the flow over which a sign is smoothed in a final fit, which starts near its end: what
-/// sticks, sticks.
-const SHARP: [f64; 2] = [0.004, 0.01];
-/// Where the steepest row of a Jacobian is so many times the one in the middle, the steps of the
-/// integrator are too long for what is to stick.
-const WILD: f64 = 1e4;
-
 /// The full fit; none where its derivatives run wild or the effect is none of its own.
 fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit)> {
     let model = &first.candidate.model;
@@ -248,7 +240,7 @@ fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit
         return None;
     }
     let solution = problem.solution(&found);
-    if first.candidate.drowns(&solution.values) {
+    if first.candidate.drowns(&solution.values, nominal.criteria()) {
         return None;
     }
     let fit = problem.result(&found).ok()?;

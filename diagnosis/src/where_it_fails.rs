@@ -1,10 +1,12 @@
 //! Where a model fails, in words with numbers: the one place that says so.
 
+use loopsight_core::Signal;
 use loopsight_model::model::{Model, signals};
 use loopsight_model::run::Run;
 use loopsight_model::simulate::{Simulator, try_follow};
 use serde::Serialize;
 
+use crate::criteria::FailsCriteria;
 use crate::motion::{Motion, changes, rest, speed};
 use crate::problem::Solution;
 use crate::progress::{Cancelled, Work};
@@ -21,14 +23,8 @@ pub struct Statement {
     pub signal: String,
 }
 
-/// How long after a change of direction its effect is looked for, s.
-const AFTER_CHANGE: f64 = 0.1;
 /// Bins of a quantity the error may depend on.
 const BINS: usize = 20;
-/// A statement must speak of this much more error than its share of the samples.
-const TELLING: f64 = 1.5;
-/// Fewest samples of a direction of motion.
-const FEWEST: usize = 10;
 /// Most statements of a diagnosis.
 const MOST: usize = 8;
 
@@ -53,19 +49,20 @@ pub(crate) fn where_it_fails(
     runs: &[Run],
     work: &Work<'_>,
 ) -> Result<Vec<Statement>, Cancelled> {
+    let criteria = &work.criteria().fails;
     let mut list = Vec::new();
     for (m, samples) in model
         .measured
         .iter()
         .zip(collect(model, solution, runs, work)?)
     {
-        let (name, unit) = (m.signal.id, m.signal.unit);
-        let motion = Motion::of(unit);
+        let name = m.signal.id;
+        let motion = Motion::of(m.signal.unit);
         let found = [
-            after_change(name, motion, &samples),
-            by_direction(name, unit, motion, &samples),
-            dependence(model, name, &samples),
-            by_run(name, runs, &samples),
+            after_change(name, motion, &samples, criteria),
+            by_direction(m.signal, motion, &samples, criteria),
+            dependence(model, name, &samples, criteria),
+            by_run(name, runs, &samples, criteria),
         ];
         list.extend(
             found
@@ -93,6 +90,7 @@ fn collect(
     runs: &[Run],
     work: &Work<'_>,
 ) -> Result<Vec<Samples>, Cancelled> {
+    let criteria = &work.criteria().fails;
     let n = model.measured.len();
     let mut all: Vec<Samples> = (0..n)
         .map(|_| Samples {
@@ -113,7 +111,7 @@ fn collect(
         })
         .collect();
     for (samples, of_signal) in all.iter_mut().zip(&speeds) {
-        samples.rest = rest(of_signal.iter().flatten().copied());
+        samples.rest = rest(of_signal.iter().flatten().copied(), criteria.rest);
     }
     for (index, (run, x0)) in runs.iter().zip(&solution.states).enumerate() {
         let turned: Vec<Vec<usize>> = all
@@ -137,7 +135,7 @@ fn collect(
                     .map(|last| run.time()[k] - run.time()[turned[i][last]]);
                 samples
                     .after_change
-                    .push(since.is_some_and(|s| s < AFTER_CHANGE * (1.0 + 1e-9)));
+                    .push(since.is_some_and(|s| s < criteria.after_change_s * (1.0 + 1e-9)));
                 for (list, value) in samples.quantities.iter_mut().zip(now.signals()) {
                     list.push(*value);
                 }
@@ -166,12 +164,18 @@ fn share(samples: &Samples, pick: impl Fn(usize) -> bool) -> (f64, f64) {
     )
 }
 
-fn after_change(name: &str, motion: Motion, samples: &Samples) -> Option<Said> {
+fn after_change(
+    name: &str,
+    motion: Motion,
+    samples: &Samples,
+    criteria: &FailsCriteria,
+) -> Option<Said> {
     let (error, part) = share(samples, |k| samples.after_change[k]);
-    (part > 0.0 && error > TELLING * part).then(|| {
+    (part > 0.0 && error > criteria.telling * part).then(|| {
         let said = format!(
-            "{:.0} % of the squared error of {name} lies within {AFTER_CHANGE} s after a {}, which is {:.0} % of the time",
+            "{:.0} % of the squared error of {name} lies within {} s after a {}, which is {:.0} % of the time",
             100.0 * error,
+            criteria.after_change_s,
             motion.change(),
             100.0 * part
         );
@@ -179,7 +183,13 @@ fn after_change(name: &str, motion: Motion, samples: &Samples) -> Option<Said> {
     })
 }
 
-fn by_direction(name: &str, unit: &str, motion: Motion, samples: &Samples) -> Option<Said> {
+fn by_direction(
+    signal: &Signal,
+    motion: Motion,
+    samples: &Samples,
+    criteria: &FailsCriteria,
+) -> Option<Said> {
+    let (name, unit) = (signal.id, signal.unit);
     let mean = |sign: f64| {
         let (mut sum, mut n) = (0.0, 0usize);
         for (e, v) in samples.error.iter().zip(&samples.speed) {
@@ -191,13 +201,13 @@ fn by_direction(name: &str, unit: &str, motion: Motion, samples: &Samples) -> Op
         (sum / n.max(1) as f64, n)
     };
     let ((forwards, a), (backwards, b)) = (mean(1.0), mean(-1.0));
-    if a < FEWEST || b < FEWEST {
+    if a < criteria.fewest || b < criteria.fewest {
         return None;
     }
     let explained = a as f64 * forwards * forwards + b as f64 * backwards * backwards;
     let all: f64 = samples.error.iter().map(|e| e * e).sum();
     let part = explained / all;
-    (part > 0.05).then(|| {
+    (part > criteria.directions).then(|| {
         let [ahead, back] = motion.directions(unit);
         let said = format!(
             "the mean residual of {name} is {forwards:+.3} {unit} {ahead} and {backwards:+.3} {unit} {back}"
@@ -207,7 +217,12 @@ fn by_direction(name: &str, unit: &str, motion: Motion, samples: &Samples) -> Op
 }
 
 /// The quantity that the residual depends on most: share of its variance between bins.
-fn dependence(model: &Model, name: &str, samples: &Samples) -> Option<Said> {
+fn dependence(
+    model: &Model,
+    name: &str,
+    samples: &Samples,
+    criteria: &FailsCriteria,
+) -> Option<Said> {
     let all: f64 = samples.error.iter().map(|e| e * e).sum();
     let mut best: Option<(f64, &str)> = None;
     for (signal, values) in signals(model.plant).zip(&samples.quantities) {
@@ -237,7 +252,7 @@ fn dependence(model: &Model, name: &str, samples: &Samples) -> Option<Said> {
         }
     }
     let (part, quantity) = best?;
-    (part > 0.1).then(|| {
+    (part > criteria.depends).then(|| {
         let said = format!(
             "the residual of {name} depends on {quantity}: its mean over that accounts for {:.0} % of the squared error",
             100.0 * part
@@ -246,7 +261,7 @@ fn dependence(model: &Model, name: &str, samples: &Samples) -> Option<Said> {
     })
 }
 
-fn by_run(name: &str, runs: &[Run], samples: &Samples) -> Option<Said> {
+fn by_run(name: &str, runs: &[Run], samples: &Samples, criteria: &FailsCriteria) -> Option<Said> {
     if runs.len() < 2 {
         return None;
     }
@@ -256,7 +271,7 @@ fn by_run(name: &str, runs: &[Run], samples: &Samples) -> Option<Said> {
             (i, error, part)
         })
         .max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
-    (error > TELLING * part && error > 0.3).then(|| {
+    (error > criteria.telling * part && error > criteria.run).then(|| {
         let called = match runs[worst].name() {
             "" => format!("{}", worst + 1),
             called => called.to_owned(),

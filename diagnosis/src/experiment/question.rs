@@ -7,6 +7,7 @@ use loopsight_model::registry::{self, BuildError};
 
 use crate::Place;
 use crate::candidates::{channel_sets, suit};
+use crate::criteria::Criteria;
 use crate::experiment::Limits;
 use crate::progress::Cancelled;
 
@@ -261,8 +262,10 @@ pub(super) fn rivals(
     b: Option<&Place>,
     rms: &[f64],
     limit: f64,
+    criteria: &Criteria,
 ) -> Result<Rivals, QuestionError> {
-    let with = |place: &Place| Side::new(model, place, rms, limit);
+    let sign_width = criteria.search.sign_width;
+    let with = |place: &Place| Side::new(model, place, rms, limit, sign_width);
     let first = with(a)?;
     let Some(b) = b else {
         return Ok(Rivals {
@@ -361,7 +364,13 @@ struct Side {
 }
 
 impl Side {
-    fn new(model: &Model, place: &Place, rms: &[f64], limit: f64) -> Result<Self, QuestionError> {
+    fn new(
+        model: &Model,
+        place: &Place,
+        rms: &[f64],
+        limit: f64,
+        sign_width: f64,
+    ) -> Result<Self, QuestionError> {
         let at: Vec<&str> = place.at.iter().map(String::as_str).collect();
         let misfit = || QuestionError::FitsNowhere {
             effect: place.effect.clone(),
@@ -369,7 +378,7 @@ impl Side {
         };
         let mut with = model.with_effect(&place.effect, &at).ok_or_else(misfit)?;
         let meta = with.effects.last().map(|e| e.meta).ok_or_else(misfit)?;
-        let flow = suit(&mut with, rms);
+        let flow = suit(&mut with, rms, sign_width);
         let first = model.parameters.len();
         let on_input = with
             .effects

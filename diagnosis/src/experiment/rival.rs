@@ -163,7 +163,8 @@ const DIFFERENCED: Arma = Arma {
 
 /// Standard errors of a least-squares fit, `(JᵀJ)⁻¹ Jᵀ cov(e) J (JᵀJ)⁻¹`; infinite where a
 /// parameter, or a combination it is part of, has no influence.
-pub(crate) fn standard_errors(information: &Information) -> Vec<f64> {
+pub(crate) fn standard_errors(information: &Information, flat: f64) -> Vec<f64> {
+    let least = flat;
     let Information { gram, meat } = information;
     let n = gram.nrows();
     if gram.iter().chain(meat).any(|v| !v.is_finite()) {
@@ -184,7 +185,7 @@ pub(crate) fn standard_errors(information: &Information) -> Vec<f64> {
     let eigen = unit(gram).symmetric_eigen();
     let inverted = eigen
         .eigenvalues
-        .map(|v| if v > FLAT { 1.0 / v } else { 0.0 });
+        .map(|v| if v > least { 1.0 / v } else { 0.0 });
     let vectors = &eigen.eigenvectors;
     let inverse = vectors * DMatrix::from_diagonal(&inverted) * vectors.transpose();
     let covariance = &inverse * unit(meat) * &inverse;
@@ -199,9 +200,6 @@ pub(crate) fn standard_errors(information: &Information) -> Vec<f64> {
         })
         .collect()
 }
-
-/// Eigenvalue of the normalised information below which a combination is not determined.
-const FLAT: f64 = 1e-10;
 
 fn weigh(mut residual: DVector<f64>, noise: &[f64]) -> DVector<f64> {
     for (k, value) in residual.iter_mut().enumerate() {

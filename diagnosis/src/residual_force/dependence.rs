@@ -17,8 +17,6 @@ use crate::progress::{Cancelled, Work};
 
 /// Bins of a quantity.
 const BINS: usize = 16;
-/// Bins with fewer samples say nothing.
-const FEWEST: usize = 15;
 /// Share of the samples beyond either end of the bins.
 const TAIL: f64 = 0.01;
 
@@ -171,7 +169,7 @@ fn dependence(
             bins: (0..part.center.len())
                 .filter_map(|bin| {
                     let (mean, std_error) = means.next()?;
-                    (part.count[bin] >= FEWEST).then(|| Bin {
+                    (part.count[bin] >= work.criteria().force.fewest).then(|| Bin {
                         center: part.center[bin],
                         mean,
                         std_error,

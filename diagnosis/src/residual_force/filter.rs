@@ -9,6 +9,7 @@ use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::criteria::LogCriteria;
 use crate::floor::noise;
 use crate::problem::Solution;
 use crate::progress::{Cancelled, Work};
@@ -169,12 +170,12 @@ impl<'m> Linear<'m> {
 
 /// Variances of the sensors' noise, and of what is rounded off at a sample: that noise comes back,
 /// with the opposite sign, in the next difference of counts.
-fn sensors(model: &Model, run: &Run) -> (DVector<f64>, DVector<f64>) {
+fn sensors(model: &Model, run: &Run, criteria: &LogCriteria) -> (DVector<f64>, DVector<f64>) {
     let n = model.measured.len();
     let mut white = DVector::zeros(n);
     let mut rounding = DVector::zeros(n);
     for (i, measured) in model.measured.iter().enumerate() {
-        let (noise, std) = noise(&measured.sensor, i, std::slice::from_ref(run));
+        let (noise, std) = noise(&measured.sensor, i, std::slice::from_ref(run), criteria);
         let least = (LEAST_NOISE * std).max(f64::MIN_POSITIVE.sqrt()).powi(2);
         if matches!(measured.sensor, Sensor::EncoderCounts(_)) {
             white[i] = least;
@@ -226,7 +227,7 @@ fn filtered(
     ));
     let places = unknown.iter().map(|(place, _)| *place).collect();
     let mut linear = Linear::new(&bare, values, places, x0.as_slice(), run.input(0));
-    let (white, rounding) = sensors(model, run);
+    let (white, rounding) = sensors(model, run, &work.criteria().log);
     let nz = nx + ny;
     // Noise of a sample: rounding as a state, and all of it in what is measured.
     let mut sensing = DMatrix::zeros(nz + ny, nz + ny);

@@ -33,13 +33,6 @@ const MOST_SAMPLES: usize = 30_000;
 /// Weight of a coefficient of zero, as a share of what the samples say: enough for terms that the
 /// parameters can be.
 const RIDGE: f64 = 1e-7;
-/// The squares of the innovations must exceed those of noise by so many standard deviations.
-const SEEN: f64 = 5.0;
-/// A coefficient must be so many standard errors from zero to be written down.
-const SURE: f64 = 3.0;
-/// Of places that explain as much as this share of the best, the simplest is taken.
-const AS_GOOD: f64 = 0.97;
-
 /// A force that would make the model agree with the measurements.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ResidualForce {
@@ -98,6 +91,7 @@ pub(crate) fn of_solution(
     runs: &[Run],
     work: &Work<'_>,
 ) -> Result<Option<ResidualForce>, Cancelled> {
+    let criteria = &work.criteria().force;
     let runs = &shortened(runs);
     let filtered = filter(model, solution, runs, work)?;
     let noise: f64 = filtered.iter().map(|f| f.noise).sum();
@@ -111,7 +105,7 @@ pub(crate) fn of_solution(
     let spread = noise * (2.0 / bent.innovations.len().max(1) as f64).sqrt();
     let blocks = Blocks::new(&bent, runs, RIDGE, work)?;
     let plain: f64 = blocks.unseen(&known).iter().sum();
-    if plain - noise < SEEN * spread {
+    if plain - noise < criteria.seen * spread {
         return Ok(None);
     }
 
@@ -125,9 +119,9 @@ pub(crate) fn of_solution(
             let better = best.as_ref().is_none_or(|best| {
                 let other = &best.chosen;
                 if chosen.complexity < other.complexity {
-                    chosen.explained > AS_GOOD * other.explained
+                    chosen.explained > criteria.as_good * other.explained
                 } else {
-                    other.explained < AS_GOOD * chosen.explained
+                    other.explained < criteria.as_good * chosen.explained
                 }
             });
             if !better {
@@ -135,7 +129,7 @@ pub(crate) fn of_solution(
             }
             let of_terms = chosen.terms.iter().flat_map(|t| &choices[*t].columns);
             let columns: Vec<usize> = known.iter().chain(of_terms).copied().collect();
-            let Some(numbers) = sure(&blocks, known.len(), columns.clone()) else {
+            let Some(numbers) = sure(&blocks, known.len(), columns.clone(), criteria.sure) else {
                 return Ok(None);
             };
             best = Some(Found {
@@ -189,6 +183,7 @@ pub(crate) fn of_solution(
             &names,
             &depends_on,
             expression.as_ref().map(|_| (&laws[..], share)),
+            criteria.telling,
         ),
         unit: found.group.channels[at[0]].unit.to_owned(),
         at: names,
@@ -199,10 +194,10 @@ pub(crate) fn of_solution(
 
 /// The coefficients of `columns`; zero for what is no more than noise, as one half of a wave may be,
 /// but for the first `known`.
-fn sure(blocks: &Blocks, known: usize, columns: Vec<usize>) -> Option<Vec<f64>> {
+fn sure(blocks: &Blocks, known: usize, columns: Vec<usize>, sure: f64) -> Option<Vec<f64>> {
     let all = blocks.solve(&columns)?;
     let stays: Vec<usize> = (0..columns.len())
-        .filter(|i| *i < known || all[*i].0.abs() > SURE * all[*i].1)
+        .filter(|i| *i < known || all[*i].0.abs() > sure * all[*i].1)
         .collect();
     let kept: Vec<usize> = stays.iter().map(|i| columns[*i]).collect();
     let mut numbers = vec![0.0; columns.len()];

@@ -3,16 +3,6 @@
 use super::blocks::{Blocks, gain};
 use crate::progress::{Cancelled, Work};
 
-/// A term must be so many standard errors better on blocks that it was not fitted to: there are
-/// hundreds to choose from.
-const CERTAIN: f64 = 4.0;
-/// And account for so much of what noise does not explain.
-const WORTH: f64 = 0.03;
-/// Most terms.
-const MOST: usize = 4;
-/// Of terms that are as good as this share of the best, the simplest is taken.
-const AS_GOOD: f64 = 0.97;
-
 /// A term that may be chosen.
 #[derive(Clone, Debug)]
 pub(super) struct Choice {
@@ -43,6 +33,8 @@ pub(super) fn select(
     noise: f64,
     work: &Work<'_>,
 ) -> Result<Chosen, Cancelled> {
+    let criteria = &work.criteria().force;
+    let certain = criteria.certain;
     let columns = |terms: &[usize]| -> Vec<usize> {
         let chosen = terms
             .iter()
@@ -52,10 +44,10 @@ pub(super) fn select(
     let plain = blocks.unseen(known);
     let base: f64 = plain.iter().sum();
     // White residuals: a coefficient's square in standard errors is what it takes off.
-    let worth = (WORTH * (base - noise)).max(CERTAIN * CERTAIN);
+    let worth = (criteria.worth * (base - noise)).max(certain * certain);
     let mut terms: Vec<usize> = Vec::new();
     let mut losses = plain.clone();
-    while terms.len() < MOST {
+    while terms.len() < criteria.most {
         let mut tried: Vec<(usize, f64, f64)> = (0..choices.len())
             .filter(|t| !terms.contains(t))
             .map(|t| {
@@ -65,11 +57,11 @@ pub(super) fn select(
                 Ok((t, sum, errors))
             })
             .collect::<Result<_, Cancelled>>()?;
-        tried.retain(|(_, sum, errors)| *sum > worth && *errors > CERTAIN);
+        tried.retain(|(_, sum, errors)| *sum > worth && *errors > certain);
         let best = tried.iter().map(|t| t.1).fold(0.0, f64::max);
         let simplest = tried
             .iter()
-            .filter(|t| t.1 >= AS_GOOD * best)
+            .filter(|t| t.1 >= criteria.as_good * best)
             .min_by_key(|t| choices[t.0].complexity);
         let Some((term, ..)) = simplest else {
             break;
@@ -83,7 +75,7 @@ pub(super) fn select(
         without.remove(at);
         let fewer = blocks.unseen(&columns(&without));
         let (sum, errors) = gain(&fewer, &losses);
-        if sum > worth && errors > CERTAIN {
+        if sum > worth && errors > certain {
             at += 1;
         } else {
             terms = without;

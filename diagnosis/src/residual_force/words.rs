@@ -6,8 +6,6 @@ use super::dependence::Dependence;
 use super::place::{Group, Law};
 use super::shape::{Shape, Variable};
 
-/// Shares below this are not worth a word.
-const TELLING: f64 = 0.05;
 /// Quantities that are named.
 const NAMED: usize = 3;
 /// Significant digits of a number in an expression.
@@ -22,17 +20,18 @@ fn both(names: &[String]) -> String {
     }
 }
 
-/// What the force depends on.
+/// What the force depends on; shares below `telling` are not worth a word.
 pub(super) fn statement(
     at: &[String],
     depends_on: &[Dependence],
     expression: Option<(&[Law], f64)>,
+    telling: f64,
 ) -> String {
     let at = both(at);
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let named: Vec<String> = depends_on
         .iter()
-        .filter(|d| d.share_of_variance > TELLING)
+        .filter(|d| d.share_of_variance > telling)
         .take(NAMED)
         .map(|d| format!("{}: {}", d.quantity, percent(d.share_of_variance)))
         .collect();
