@@ -1,15 +1,65 @@
-//! The vocabulary of loopsight: what a plant, an effect, an estimator, a controller and a driver
-//! are, how they are integrated in time, and the tick of the loop that runs them.
+//! The vocabulary of loopsight, and the tick of its control loop. No `std`, no allocator.
 //!
-//! Two views of one component live here:
+//! Take this crate to write a plant or an effect, or to build firmware. To read models from TOML and to
+//! simulate them take `loopsight-model`; to compare, fit, diagnose and run take `loopsight`.
 //!
-//! * the **static view** ([`Plant`], [`Effect`]): what an author writes once, generic over the
-//!   scalar ([`Real`]), with fixed sizes, without `std` and without an allocator;
-//! * the **dynamic view** ([`Dynamics`], [`Physics`]): the same mathematics behind slices, object
-//!   safe, made from the static view by [`declare_plant!`] and [`declare_effect!`].
+//! # What is here
 //!
-//! Nothing here allocates. The feature `std` adds the clock of a host and the traits of boxed parts;
-//! what is chosen at run time (registry, TOML, the composed model) is the crate `loopsight-model`.
+//! | what | types |
+//! |---|---|
+//! | quantities with units, declared once as constants | [`Signal`], [`Parameter`], [`Derived`], [`unit`] |
+//! | where physics acts on a plant, and what can be read there | [`Channel`], [`Place`], [`Role`] |
+//! | equations of motion, and physics that is added to them | [`Plant`], [`Effect`] |
+//! | parts of a loop | [`Estimator`], [`Controller`], [`AffineModel`], [`Driver`], [`Clock`] |
+//! | the tick: read, learn, supervise, control, limit, write | [`Loop`], [`Observer`], [`TickRecord`] |
+//! | safe adaptation | [`learning`], [`limits`], [`supervisor`] |
+//! | fourth-order Runge–Kutta with a fixed step | [`Rk4`], [`rk4_step`], [`substeps`] |
+//!
+//! # One source, every scalar
+//!
+//! Equations are generic over the scalar ([`Real`]). The same source runs as `f32` on a microcontroller, as
+//! `f64` on a desk, and with dual numbers where a fit needs derivatives:
+//!
+//! ```
+//! use loopsight_core::{
+//!     Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, declare_effect,
+//! };
+//!
+//! /// Drag of the air: `w = -c ω |ω|`.
+//! struct Drag;
+//!
+//! impl Effect for Drag {
+//!     const META: EffectMeta = EffectMeta {
+//!         id: "drag",
+//!         summary: "drag of the air at a shaft",
+//!         equation: "w = -c omega |omega|",
+//!         places: &[PlaceKind::Effort],
+//!         reads: &[Role::Flow],
+//!         parameters: &[Parameter::new("c", "c", "channel/flow^2", "drag per speed squared")],
+//!         ..EffectMeta::PLAIN
+//!     };
+//!
+//!     fn contribution<S: Real>(at: &Reading<'_, S>, _z: &[S; 0], p: &[S; 1]) -> S {
+//!         let speed = at.get(Role::Flow);
+//!         -p[0] * speed * speed.abs()
+//!     }
+//! }
+//! declare_effect!(Drag, "drag");
+//!
+//! let at = Reading::nothing().with(Role::Flow, &3.0f32);
+//! assert_eq!(Drag::contribution(&at, &[], &[0.5]), -4.5f32);
+//! ```
+//!
+//! The traits an author implements ([`Plant`], [`Effect`]) have arrays of fixed sizes. The traits that a
+//! program composes at run time ([`Dynamics`], [`Physics`]) have slices and are object-safe.
+//! [`declare_plant!`] and [`declare_effect!`] make the second out of the first; the macros of the same
+//! names in `loopsight-model` also enter the part in the registry.
+//!
+//! # Features
+//!
+//! | feature | what it adds |
+//! |---|---|
+//! | `std` (default) | [`SystemClock`], and the traits of a loop's parts for boxed parts |
 
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 

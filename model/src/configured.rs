@@ -42,10 +42,18 @@ fn read_parameter<'de, A: MapAccess<'de>>(
 }
 
 /// A plant with the parameters of a file.
-#[derive(Clone)]
 pub struct ConfiguredPlant<P> {
     given: Values,
     plant: PhantomData<P>,
+}
+
+impl<P> Clone for ConfiguredPlant<P> {
+    fn clone(&self) -> Self {
+        Self {
+            given: self.given.clone(),
+            plant: PhantomData,
+        }
+    }
 }
 
 impl<P: DeclaredPlant> ConfiguredPlant<P> {
@@ -159,11 +167,20 @@ impl<'de> Visitor<'de> for SetReader {
 }
 
 /// An effect with the channels and parameters of a file.
-#[derive(Clone)]
 pub struct ConfiguredEffect<E> {
     at: Vec<String>,
     given: Values,
     effect: PhantomData<E>,
+}
+
+impl<E> Clone for ConfiguredEffect<E> {
+    fn clone(&self) -> Self {
+        Self {
+            at: self.at.clone(),
+            given: self.given.clone(),
+            effect: PhantomData,
+        }
+    }
 }
 
 impl<E: DeclaredEffect> ConfiguredEffect<E> {
