@@ -1,18 +1,8 @@
 //! What to do next.
 
 use loopsight_model::model::Model;
-use serde::Serialize;
 
-use crate::conclusion::{Conclusion, Explanation, Place};
-
-/// An experiment and what it is good for.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Advice {
-    /// Why.
-    pub why: String,
-    /// What to record.
-    pub experiment: String,
-}
+use crate::conclusion::{Advice, Conclusion, EffectAt, Explanation};
 
 pub(crate) fn advice(
     model: &Model,
@@ -68,7 +58,7 @@ pub(crate) fn advice(
 }
 
 /// An effect with its channels, as the command `experiment` reads it.
-fn named(place: &Place) -> String {
+fn named(place: &EffectAt) -> String {
     format!("{}@{}", place.effect, place.at.join("+"))
 }
 

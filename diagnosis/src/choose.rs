@@ -1,6 +1,6 @@
 //! Which explanation comes first.
 
-use crate::conclusion::{Explanation, Place};
+use crate::conclusion::{EffectAt, Explanation};
 use crate::criteria::{ChoiceCriteria, Criteria};
 use crate::judge::{advantage, nrmse};
 use crate::trial::Judged;
@@ -74,7 +74,7 @@ pub(crate) fn choose(
         let near = unseen(i) <= unseen(chosen) && error(i) < never_same * error(chosen);
         near && id(i) != id(chosen)
     };
-    let class: Vec<Place> = (0..finalists.len())
+    let class: Vec<EffectAt> = (0..finalists.len())
         .filter(|i| not_worse.contains(i) || as_well(*i))
         .filter(|i| *i != chosen && complexity(*i) <= complexity(chosen))
         .map(|i| explanations[i].place.clone())

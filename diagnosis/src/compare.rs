@@ -9,9 +9,8 @@ use serde::Serialize;
 
 use crate::error::CompareError;
 use crate::measurements::Measurements;
-use crate::observer::{Held, hold};
-use crate::prediction::{InitialStates, one_step};
-use crate::problem::Solution;
+use crate::observer::{Correction, hold};
+use crate::prediction::{InitialStates, Solution, one_step};
 use crate::progress::{Stage, Work};
 use crate::score::{SignalScore, Tally, overall};
 use crate::where_it_fails::{Statement, where_it_fails};
@@ -30,7 +29,7 @@ pub struct Comparison {
     /// How the free run was held to the measurements; absent where it is simulated from the inputs
     /// alone.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub observer: Option<Held>,
+    pub observer: Option<Correction>,
     /// Where the free run fails, the most telling first.
     #[serde(skip)]
     pub where_it_fails: Vec<Statement>,
@@ -135,7 +134,7 @@ pub fn compare(
         fit_percent: 100.0 * (1.0 - nrmse),
         signals,
         faults: faults.to_vec(),
-        observer: Held::of(&runs),
+        observer: Correction::of(&runs),
         where_it_fails: where_it_fails(model, &solution, &runs, work)?,
         runs: traces,
     })

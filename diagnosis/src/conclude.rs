@@ -4,7 +4,7 @@ use crate::advice::advice;
 use crate::choose::choose;
 use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::{Criteria, MissingCriteria};
-use crate::fit::{Estimate, Verdict};
+use crate::estimate::{Estimate, ParameterVerdict};
 use crate::judge::{Losses, advantage, nrmse};
 use crate::trial::{Judged, Nominal};
 
@@ -119,9 +119,12 @@ impl Evidence<'_> {
 /// parameters is not found, however well a test recording speaks of it.
 fn determined(explanation: &Explanation, undetermined: f64) -> bool {
     let says_nothing = |p: &Estimate| match p.verdict {
-        Verdict::Flat | Verdict::Dead | Verdict::Held | Verdict::Unfinished => true,
-        Verdict::NotPinned => p.std_error.is_none_or(|e| e > undetermined * p.value.abs()),
-        Verdict::Good | Verdict::AtBound => false,
+        ParameterVerdict::Flat
+        | ParameterVerdict::Dead
+        | ParameterVerdict::Frozen
+        | ParameterVerdict::Unfinished => true,
+        ParameterVerdict::NotPinned => p.std_error.is_none_or(|e| e > undetermined * p.value.abs()),
+        ParameterVerdict::Good | ParameterVerdict::AtBound => false,
     };
     !explanation.parameters.values().all(says_nothing)
 }

@@ -6,9 +6,8 @@ use loopsight_model::model::Model;
 use loopsight_recordings::Fault;
 use serde::Serialize;
 
-use crate::advice::Advice;
-use crate::fit::Estimate;
-use crate::observer::Held;
+use crate::estimate::Estimate;
+use crate::observer::Correction;
 use crate::residual_force::ResidualForce;
 use crate::where_it_fails::Statement;
 
@@ -39,7 +38,7 @@ pub enum Conclusion {
 
 /// An effect at its channels.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Place {
+pub struct EffectAt {
     /// Id of the effect.
     pub effect: String,
     /// Ids of the channels.
@@ -51,7 +50,7 @@ pub struct Place {
 pub struct Explanation {
     /// The effect and where.
     #[serde(flatten)]
-    pub place: Place,
+    pub place: EffectAt,
     /// Free-run error with it, on data it was not fitted to.
     pub nrmse: f64,
     /// The effect's parameters, by their ids.
@@ -61,7 +60,7 @@ pub struct Explanation {
     /// work was cancelled.
     pub significance: f64,
     /// Candidates that these data cannot tell from it.
-    pub indistinguishable_from: Vec<Place>,
+    pub indistinguishable_from: Vec<EffectAt>,
     /// What to know about it.
     pub note: String,
     /// The model with it, fitted.
@@ -70,6 +69,15 @@ pub struct Explanation {
     /// Free-run error on what it was fitted to; NaN as `significance`.
     #[serde(skip)]
     pub nrmse_fit: f64,
+}
+
+/// An experiment and what it is good for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Advice {
+    /// Why.
+    pub why: String,
+    /// What to record.
+    pub experiment: String,
 }
 
 /// The result of [`diagnose`](crate::diagnose()).
@@ -82,7 +90,7 @@ pub struct Diagnosis {
     /// The conclusion.
     pub verdict: Conclusion,
     /// The missing effect.
-    pub missing: Option<Place>,
+    pub missing: Option<EffectAt>,
     /// Explanations, best first.
     pub candidates: Vec<Explanation>,
     /// Where the model fails, in words.
@@ -97,7 +105,7 @@ pub struct Diagnosis {
     /// How free runs were held to the measurements; absent where they are simulated from the inputs
     /// alone.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub observer: Option<Held>,
+    pub observer: Option<Correction>,
     /// The nominal model, fitted.
     #[serde(skip)]
     pub model: Option<Model>,

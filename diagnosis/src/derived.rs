@@ -7,7 +7,7 @@ use loopsight_model::model::Model;
 use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::DMatrix;
 
-use crate::fit::{Estimate, Verdict};
+use crate::estimate::{Estimate, ParameterVerdict};
 
 /// The estimated parameters of a fit, as far as the data say.
 pub(crate) struct Known<'a> {
@@ -68,7 +68,7 @@ fn estimate(unit: &str, value: f64, gradient: &[f64], known: Option<&Known<'_>>)
         unit: unit.to_owned(),
         std_error: None,
         interval95: None,
-        verdict: Verdict::Held,
+        verdict: ParameterVerdict::Frozen,
     };
     let Some(known) = known else { return estimate };
     if gradient.iter().all(|g| *g == 0.0) {
@@ -79,7 +79,7 @@ fn estimate(unit: &str, value: f64, gradient: &[f64], known: Option<&Known<'_>>)
         .zip(&known.undetermined)
         .any(|(g, u)| *u && *g != 0.0);
     if undetermined {
-        estimate.verdict = Verdict::Flat;
+        estimate.verdict = ParameterVerdict::Flat;
         return estimate;
     }
     let mut variance = 0.0;
@@ -93,9 +93,9 @@ fn estimate(unit: &str, value: f64, gradient: &[f64], known: Option<&Known<'_>>)
     let half = known.quantile * error;
     estimate.interval95 = Some([value - half, value + half]);
     estimate.verdict = if half > known.not_pinned * value.abs() {
-        Verdict::NotPinned
+        ParameterVerdict::NotPinned
     } else {
-        Verdict::Good
+        ParameterVerdict::Good
     };
     estimate
 }

@@ -46,8 +46,8 @@ use crate::criteria::ExperimentCriteria;
 use crate::observer::unstable_at_rest;
 use crate::prediction::signal_rms;
 use crate::progress::{Cancelled, Stage, Work};
-pub use plan::{Considered, Drive, Limits, Plan, Promise, Question};
-pub use question::{QuestionError, place};
+pub use plan::{Considered, Drive, ExperimentLimits, Plan, Promise, Question};
+pub use question::{QuestionError, effect_at};
 use question::{Rivals, rivals};
 use rival::{Distance, information, response, rival, standard_errors};
 use shapes::Shape;
@@ -69,7 +69,7 @@ const LOOK_STEP: f64 = 0.005;
 pub fn experiment(
     model: &Model,
     question: &Question,
-    limits: &Limits,
+    limits: &ExperimentLimits,
     work: &Work<'_>,
 ) -> Result<Plan, QuestionError> {
     question::check(model, limits)?;
@@ -100,7 +100,7 @@ pub fn experiment(
 
 struct Design<'m> {
     model: &'m Model,
-    limits: Limits,
+    limits: ExperimentLimits,
     names: Vec<&'static str>,
     /// Of the sensors.
     noise: Vec<f64>,
@@ -110,7 +110,11 @@ struct Design<'m> {
 }
 
 impl<'m> Design<'m> {
-    fn new(model: &'m Model, limits: Limits, work: &'m Work<'m>) -> Result<Self, QuestionError> {
+    fn new(
+        model: &'m Model,
+        limits: ExperimentLimits,
+        work: &'m Work<'m>,
+    ) -> Result<Self, QuestionError> {
         let names: Vec<&'static str> = model.plant.inputs.iter().map(|s| s.id).collect();
         let drive =
             Shape::usual(names.len()).drive(&names, limits.limit, limits.period, HORIZON)?;
@@ -155,7 +159,7 @@ impl<'m> Design<'m> {
     }
 
     fn drive(&self, shape: Shape, duration: f64) -> Result<Drive, QuestionError> {
-        let Limits { limit, period, .. } = self.limits;
+        let ExperimentLimits { limit, period, .. } = self.limits;
         Ok(shape.drive(&self.names, limit, period, duration)?)
     }
 

@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 
 use crate::candidates::Candidate;
-use crate::conclusion::{Explanation, Place};
-use crate::fit::{Estimate, Fit, Method, Verdict};
+use crate::conclusion::{EffectAt, Explanation};
+use crate::estimate::{Estimate, ParameterVerdict};
+use crate::fitted::Fit;
 use crate::judge::{nrmse, significance};
 use crate::progress::Cancelled;
+use crate::settings::Method;
 use crate::trial::{Judged, Nominal};
 
 /// Most standard errors that are reported.
@@ -53,8 +55,8 @@ pub(crate) fn explain_look(judged: &Judged) -> Explanation {
 }
 
 /// The effect of a candidate, and where.
-fn place(candidate: &Candidate) -> Place {
-    Place {
+fn place(candidate: &Candidate) -> EffectAt {
+    EffectAt {
         effect: candidate.meta.id.to_owned(),
         at: candidate.at.iter().map(|c| (*c).to_owned()).collect(),
     }
@@ -88,7 +90,7 @@ fn note(fit: &Fit, candidate: &Candidate) -> String {
     for (name, estimate) in &fit.parameters {
         if matches!(
             estimate.verdict,
-            Verdict::AtBound | Verdict::Flat | Verdict::NotPinned
+            ParameterVerdict::AtBound | ParameterVerdict::Flat | ParameterVerdict::NotPinned
         ) {
             words.push(format!("{name}: {}", estimate.verdict.text()));
         }

@@ -3,12 +3,23 @@
 use nalgebra::DMatrix;
 
 use crate::criteria::FreeRunCriteria;
-use crate::observer::Step;
 
 /// Growth beyond which there is no need to look further.
 const CERTAINLY: f64 = 1e9;
 /// Instants of a run from which errors are followed, as fractions of its length.
 const STARTS: [f64; 3] = [0.0, 0.25, 0.5];
+/// One sample of a filter.
+pub(crate) struct Linearised<'s> {
+    pub(crate) k: usize,
+    /// The corrected state.
+    pub(crate) x: &'s [f64],
+    /// Derivative of the state by the state before.
+    pub(crate) a: &'s DMatrix<f64>,
+    /// Derivative of the measurement by the state before.
+    pub(crate) c: &'s DMatrix<f64>,
+    pub(crate) gain: &'s DMatrix<f64>,
+}
+
 /// The linearisations along a run.
 pub(crate) struct Path {
     time: Vec<f64>,
@@ -28,7 +39,7 @@ impl Path {
         }
     }
 
-    pub(crate) fn push(&mut self, step: &Step<'_>) {
+    pub(crate) fn push(&mut self, step: &Linearised<'_>) {
         self.a.push(step.a.clone());
         self.c.push(step.c.clone());
         self.x.push(step.x.to_vec());
@@ -176,7 +187,7 @@ mod tests {
         let mut path = Path::new(&time);
         for k in 0..n {
             let phase = 1.7 * PERIOD * f64::from(k);
-            path.push(&Step {
+            path.push(&Linearised {
                 k: k as usize,
                 x: &[size[0] * phase.sin(), size[1] * phase.cos()],
                 a: &DMatrix::from_row_slice(2, 2, &a),

@@ -5,8 +5,7 @@ use loopsight_model::run::Run;
 
 use crate::criteria::HoldoutCriteria;
 use crate::judge::Losses;
-use crate::prediction::{InitialStates, predict};
-use crate::problem::Solution;
+use crate::prediction::{InitialStates, Solution, predict};
 use crate::progress::{Cancelled, Work};
 use crate::score::Tally;
 

@@ -1,61 +1,16 @@
 //! Diagnose, add, refit, until nothing more is missing.
 
-use loopsight_model::model::Model;
-use serde::Serialize;
-
-use crate::conclusion::{Conclusion, Diagnosis, Explanation, Place};
+use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::diagnose::diagnose_above;
 use crate::error::FitError;
-use crate::fit::{Fit, FitSettings, Method, fit};
+use crate::fit::fit;
+use crate::fitted::Fit;
+use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
 use crate::progress::{Cancelled, Work};
 use crate::refine::refine;
-
-/// One step of an improvement.
-#[derive(Clone, Debug, Serialize)]
-pub struct Step {
-    /// What was added, under the name that it has in the best model; `null` for the model as it was.
-    pub added: Option<Place>,
-    /// The round whose diagnosis named it: its place among [`Improvement::diagnoses`].
-    #[serde(skip)]
-    pub round: usize,
-    /// Free-run error on what the model was fitted to.
-    pub nrmse_fit: f64,
-    /// Free-run error on what it was not fitted to.
-    pub nrmse_test: f64,
-}
-
-/// The result of [`improve`].
-#[derive(Debug, Serialize)]
-pub struct Improvement {
-    /// The model as it was, then each addition.
-    pub steps: Vec<Step>,
-    /// What the last diagnosis concludes.
-    pub verdict: Conclusion,
-    /// The diagnoses, one per round.
-    #[serde(skip)]
-    pub diagnoses: Vec<Diagnosis>,
-    /// The best model, fitted to all of the log; none where a diagnosis was refused.
-    #[serde(skip)]
-    pub best: Option<Fit>,
-}
-
-impl Improvement {
-    /// What the data could not tell from the effect of a step when it was added.
-    pub fn not_told_from(&self, step: &Step) -> Vec<&Place> {
-        let named = self
-            .diagnoses
-            .get(step.round)
-            .and_then(|d| d.candidates.first());
-        let (Some(added), Some(named)) = (&step.added, named) else {
-            return Vec::new();
-        };
-        std::iter::once(&named.place)
-            .chain(&named.indistinguishable_from)
-            .filter(|place| *place != added)
-            .collect()
-    }
-}
+use crate::settings::{FitSettings, Method};
+use loopsight_model::model::Model;
 
 /// Repeats [`diagnose`](crate::diagnose()), adding what it finds missing, until it finds nothing more.
 ///
@@ -92,7 +47,7 @@ pub fn improve(
 /// An improvement on its way.
 struct State {
     present: Model,
-    steps: Vec<Step>,
+    steps: Vec<ImprovementStep>,
     diagnoses: Vec<Diagnosis>,
 }
 
@@ -120,7 +75,7 @@ impl State {
         if let Some(fitted) = &diagnosis.model
             && self.steps.is_empty()
         {
-            self.steps.push(Step {
+            self.steps.push(ImprovementStep {
                 added: None,
                 round,
                 nrmse_fit: diagnosis.nominal_fit,
@@ -139,7 +94,7 @@ impl State {
         measurements: &Measurements<'_>,
         work: &Work<'_>,
     ) -> Result<(), FitError> {
-        self.steps.push(Step {
+        self.steps.push(ImprovementStep {
             added: Some(best.place),
             round,
             nrmse_fit: best.nrmse_fit,
@@ -165,7 +120,7 @@ impl State {
         work: &Work<'_>,
     ) -> Result<Improvement, FitError> {
         let settings = FitSettings::default();
-        let unfitted = |model: Model, step: &Step| {
+        let unfitted = |model: Model, step: &ImprovementStep| {
             let error = step.nrmse_test;
             Fit::cancelled(model, Method::OutputError, error, 0)
         };

@@ -11,14 +11,17 @@ pub mod criteria;
 mod derived;
 mod diagnose;
 mod error;
+mod estimate;
 mod experiment;
 mod explain;
-pub mod fit;
+mod fit;
+mod fitted;
 mod flatness;
 mod floor;
 mod growth;
 mod holdout;
 mod improve;
+mod improvement;
 mod judge;
 mod measurements;
 mod motion;
@@ -36,6 +39,7 @@ mod rls;
 mod rounding;
 mod score;
 mod search;
+mod settings;
 mod solve;
 mod starts;
 mod stride;
@@ -45,21 +49,26 @@ mod trial;
 mod where_it_fails;
 mod window;
 
-pub use advice::Advice;
 pub use compare::{Comparison, RunTrace, SignalTrace, compare};
-pub use conclusion::{Conclusion, Diagnosis, Explanation, Level, Place};
+pub use conclusion::{Advice, Conclusion, Diagnosis, EffectAt, Explanation, Level};
 pub use criteria::{Criteria, Criterion, Reason};
 pub use diagnose::diagnose;
 pub use error::{CompareError, FitError};
+pub use estimate::{Estimate, ParameterVerdict};
 pub use experiment::{
-    Considered, Drive, Limits, Plan, Promise, Question, QuestionError, experiment, place,
+    Considered, Drive, ExperimentLimits, Plan, Promise, Question, QuestionError, effect_at,
+    experiment,
 };
-pub use fit::{Estimate, Fit, FitSettings, Method, Verdict};
-pub use improve::{Improvement, Step, improve};
+pub use fit::fit;
+pub use fitted::Fit;
+pub use improve::improve;
+pub use improvement::{Improvement, ImprovementStep};
 pub use measurements::Measurements;
-pub use observer::{Because, Held};
+pub use observer::{Because, Correction};
 pub use progress::{CancelToken, Cancelled, Progress, Stage, Work};
-pub use regression::{Regression, Scheme};
-pub use residual_force::{Bin, Curve, Dependence, Expression, ResidualForce, residual_force};
+pub use residual_force::{
+    ForceBin, ForceCurve, ForceDependence, ForceExpression, ResidualForce, residual_force,
+};
 pub use score::SignalScore;
+pub use settings::{FitSettings, Method, Scheme};
 pub use where_it_fails::Statement;

@@ -11,12 +11,12 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use crate::floor;
-use crate::growth::{Growth, Path, unstable};
+use crate::growth::{Growth, Linearised, Path, unstable};
 use crate::progress::{Cancelled, Work};
 
 /// How a free run was held to the measurements, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Held {
+pub struct Correction {
     /// `unstable` or `integrating`.
     pub because: Because,
     /// Time in which the observer forgets, s.
@@ -35,7 +35,7 @@ pub enum Because {
     Integrating,
 }
 
-impl Held {
+impl Correction {
     /// What was done to `runs`; `None` where they are simulated from the inputs alone.
     pub(crate) fn of(runs: &[Run]) -> Option<Self> {
         let observer = runs.iter().find_map(|run| run.observer())?;
@@ -292,7 +292,7 @@ impl<'a> Design<'a> {
         fade: f64,
         uncertain: &DMatrix<f64>,
         work: &Work<'_>,
-        mut each: impl FnMut(&Step<'_>),
+        mut each: impl FnMut(&Linearised<'_>),
     ) -> Result<Option<DMatrix<f64>>, Cancelled> {
         let (nx, ny) = (self.model.n_states(), self.model.measured.len());
         let mut p = uncertain.clone();
@@ -375,7 +375,7 @@ impl<'a> Design<'a> {
             for (mut row, noise) in c.row_iter_mut().zip(&self.noise) {
                 row *= *noise;
             }
-            each(&Step {
+            each(&Linearised {
                 k,
                 x: &x,
                 a: &a,
@@ -385,16 +385,4 @@ impl<'a> Design<'a> {
         }
         Ok(Some(p))
     }
-}
-
-/// One sample of a filter.
-pub(crate) struct Step<'s> {
-    pub(crate) k: usize,
-    /// The corrected state.
-    pub(crate) x: &'s [f64],
-    /// Derivative of the state by the state before.
-    pub(crate) a: &'s DMatrix<f64>,
-    /// Derivative of the measurement by the state before.
-    pub(crate) c: &'s DMatrix<f64>,
-    pub(crate) gain: &'s DMatrix<f64>,
 }

@@ -11,7 +11,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use crate::compare::Comparison;
 use crate::derived::{Known, derived};
 use crate::error::FitError;
-use crate::fit::{Estimate, Fit, FitSettings, Method, Verdict};
+use crate::estimate::{Estimate, ParameterVerdict};
+use crate::fitted::Fit;
 use crate::flatness::Flatness;
 use crate::noise;
 use crate::observer::{growth, hold_with};
@@ -19,6 +20,7 @@ use crate::prediction::InitialStates;
 use crate::problem::{Problem, declared};
 use crate::progress::{Cancelled, Work};
 use crate::regression::batch;
+use crate::settings::{FitSettings, Method};
 use crate::solve::Effort;
 
 /// Fits the free parameters and the initial states of all runs.
@@ -221,7 +223,7 @@ impl Problem<'_> {
                 unit: parameter.unit.clone(),
                 std_error: None,
                 interval95: None,
-                verdict: Verdict::Held,
+                verdict: ParameterVerdict::Frozen,
             };
             if let Some(k) = self.free.iter().position(|i| *i == index) {
                 let error = covariance[(k, k)].max(0.0).sqrt() * self.scales[k];
@@ -237,15 +239,15 @@ impl Problem<'_> {
                 }
                 let margin = criteria.at_bound * parameter.scale();
                 estimate.verdict = if flatness.dead[k] {
-                    Verdict::Dead
+                    ParameterVerdict::Dead
                 } else if flatness.flat[k] {
-                    Verdict::Flat
+                    ParameterVerdict::Flat
                 } else if value - low < margin || high - value < margin {
-                    Verdict::AtBound
+                    ParameterVerdict::AtBound
                 } else if quantile * error > criteria.not_pinned * value.abs() {
-                    Verdict::NotPinned
+                    ParameterVerdict::NotPinned
                 } else {
-                    Verdict::Good
+                    ParameterVerdict::Good
                 };
             }
             parameters.insert(parameter.name.clone(), estimate);

@@ -162,6 +162,15 @@ pub(crate) fn signal_rms(
     Ok(squares.iter().map(|s| (s / n.max(1.0)).sqrt()).collect())
 }
 
+/// What a model is simulated with over some runs: what a fit finds.
+#[derive(Clone, Debug)]
+pub(crate) struct Solution {
+    /// Parameter values of the model.
+    pub(crate) values: Vec<f64>,
+    /// Initial states by run.
+    pub(crate) states: Vec<DVector<f64>>,
+}
+
 /// Estimated initial plant states, one per run.
 pub(crate) struct InitialStates {
     pub(crate) states: Vec<DVector<f64>>,

@@ -7,16 +7,16 @@ use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::FitError;
-use crate::fit::FitSettings;
 use crate::flatness::Named;
 use crate::noise::Block;
 use crate::positions::Positions;
 use crate::prediction::{
-    By, InitialStates, estimated_states, predict_with, residuals, sensitivities_with,
+    By, InitialStates, Solution, estimated_states, predict_with, residuals, sensitivities_with,
 };
 use crate::progress::{Cancelled, Work};
 use crate::regression::batch;
 use crate::score::Tally;
+use crate::settings::FitSettings;
 
 /// Spans of the regressions that a fit may start from, s.
 const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
@@ -51,15 +51,6 @@ pub(crate) struct Problem<'a> {
     pub(crate) positions: Option<Positions>,
     /// The best that was seen in the first pass, and the root of its cost.
     best: RefCell<Option<(f64, Solution)>>,
-}
-
-/// What a fit found.
-#[derive(Clone, Debug)]
-pub(crate) struct Solution {
-    /// Parameter values of the model.
-    pub(crate) values: Vec<f64>,
-    /// Initial states by run.
-    pub(crate) states: Vec<DVector<f64>>,
 }
 
 impl<'a> Problem<'a> {

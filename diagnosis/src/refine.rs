@@ -5,13 +5,13 @@ use rayon::prelude::*;
 
 use crate::candidates::{is_width, smooth};
 use crate::compare::compare;
-use crate::conclusion::{Diagnosis, Place};
+use crate::conclusion::{Diagnosis, EffectAt};
 use crate::error::FitError;
-use crate::fit::FitSettings;
-use crate::improve::Step;
+use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
 use crate::output_error;
 use crate::progress::{Cancelled, Stage, Work};
+use crate::settings::FitSettings;
 
 /// Makes `model` the one to go on from after the last of `steps`, fitted: what the last one made needless
 /// goes, and its step with it; simpler effects and others that the data could not tell from those of earlier
@@ -19,7 +19,7 @@ use crate::progress::{Cancelled, Stage, Work};
 /// name them. Where the work is cancelled, model and steps are those of the changes made until then.
 pub(crate) fn refine(
     model: &mut Model,
-    steps: &mut Vec<Step>,
+    steps: &mut Vec<ImprovementStep>,
     diagnoses: &[Diagnosis],
     measurements: &Measurements<'_>,
     work: &Work<'_>,
@@ -39,7 +39,7 @@ pub(crate) fn refine(
 
 /// What an earlier step added goes where the error is the same without it: what looked like a dead zone
 /// may have been a part of the friction that was added after it.
-fn needless(best: &mut Refined<'_>, steps: &mut Vec<Step>) -> Result<(), FitError> {
+fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<(), FitError> {
     let close = best.work.criteria().choice.close;
     loop {
         // The last is what was just found missing.
@@ -67,7 +67,7 @@ fn without(model: &Model, effects: &[usize]) -> Option<Model> {
 /// A simpler effect takes the place of an added one that contains it where the error hardly grows:
 /// what looked like breakaway friction may have been friction with a delay that was still missing.
 /// The step that added it is then one that added the simpler effect.
-fn simplified(best: &mut Refined<'_>, steps: &mut [Step]) -> Result<(), FitError> {
+fn simplified(best: &mut Refined<'_>, steps: &mut [ImprovementStep]) -> Result<(), FitError> {
     let criteria = &best.work.criteria().improve;
     for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
         let instances = instances(best.model, place);
@@ -92,7 +92,7 @@ fn simplified(best: &mut Refined<'_>, steps: &mut [Step]) -> Result<(), FitError
 /// one is there: a late command from a late sensor, when the machine has friction.
 fn reconsidered(
     best: &mut Refined<'_>,
-    steps: &mut [Step],
+    steps: &mut [ImprovementStep],
     diagnoses: &[Diagnosis],
 ) -> Result<(), FitError> {
     let criteria = &best.work.criteria().improve;
@@ -113,7 +113,7 @@ fn reconsidered(
 
 /// The model with the effect of `other` in the place of that of `place`; parameters of the same name
 /// keep their values, others begin a noticeable step from neutral.
-fn exchanged(model: &Model, place: &Place, other: &Place) -> Option<Model> {
+fn exchanged(model: &Model, place: &EffectAt, other: &EffectAt) -> Option<Model> {
     let instances = instances(model, place);
     let (first, others) = instances.split_first()?;
     let known: Vec<&str> = model.effects[*first]
@@ -186,7 +186,7 @@ impl Refined<'_> {
 
 /// Where the effect of a step stands among those of `model`: once, or once for each of its channels;
 /// nowhere when another has taken its place.
-fn instances(model: &Model, place: &Place) -> Vec<usize> {
+fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
     let of_place = |e: &Attached| {
         e.meta.id == place.effect && e.at.iter().all(|c| place.at.iter().any(|at| at == c.id))
     };

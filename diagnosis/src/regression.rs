@@ -2,7 +2,8 @@
 
 use loopsight_model::log_map::Hold;
 use loopsight_model::model::{Model, pseudo_inverse};
-pub use loopsight_model::regression::{Regression, Scheme};
+pub(crate) use loopsight_model::regression::Regression;
+use loopsight_model::regression::Scheme;
 use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 

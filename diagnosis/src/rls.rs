@@ -11,9 +11,11 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use crate::compare::Comparison;
 use crate::derived::derived;
 use crate::error::FitError;
-use crate::fit::{Estimate, Fit, FitSettings, Method, Verdict};
+use crate::estimate::{Estimate, ParameterVerdict};
+use crate::fitted::Fit;
 use crate::progress::{Stage, Work};
 use crate::regression::{Regression, for_each_row};
+use crate::settings::{FitSettings, Method};
 
 /// Samples of the estimate's history that are kept for pictures.
 const HISTORY: usize = 2000;
@@ -97,11 +99,11 @@ pub(crate) fn fit(
                 std_error: Some(error),
                 interval95: Some([value - quantile * error, value + quantile * error]),
                 verdict: if !parameter.declaration.admits(value) {
-                    Verdict::AtBound
+                    ParameterVerdict::AtBound
                 } else if quantile * error > criteria.not_pinned * value.abs() {
-                    Verdict::NotPinned
+                    ParameterVerdict::NotPinned
                 } else {
-                    Verdict::Good
+                    ParameterVerdict::Good
                 },
             },
             None => Estimate {
@@ -110,9 +112,9 @@ pub(crate) fn fit(
                 std_error: None,
                 interval95: None,
                 verdict: if parameter.free {
-                    Verdict::Dead
+                    ParameterVerdict::Dead
                 } else {
-                    Verdict::Held
+                    ParameterVerdict::Frozen
                 },
             },
         };

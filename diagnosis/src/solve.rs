@@ -7,7 +7,8 @@ use basin::{
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::FitError;
-use crate::problem::{Problem, Solution};
+use crate::prediction::Solution;
+use crate::problem::Problem;
 use crate::progress::{Cancelled, Stage};
 
 /// How hard a fit tries.

@@ -3,7 +3,7 @@
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 
-use crate::advice::Advice;
+use crate::conclusion::Advice;
 use crate::criteria::LogCriteria;
 
 /// Whether a measured signal changes in a run.

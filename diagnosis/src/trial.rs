@@ -5,11 +5,12 @@ use nalgebra::DVector;
 
 use crate::candidates::Candidate;
 use crate::criteria::SearchCriteria;
-use crate::fit::Fit;
+use crate::fitted::Fit;
 use crate::holdout::{Holdout, Judgement};
 use crate::judge::{Losses, nrmse, significance};
 use crate::positions::Positions;
-use crate::problem::{Problem, Solution};
+use crate::prediction::Solution;
+use crate::problem::Problem;
 use crate::progress::Work;
 use crate::solve::Effort;
 

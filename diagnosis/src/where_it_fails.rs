@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::criteria::FailsCriteria;
 use crate::motion::{Motion, changes, rest, speed};
-use crate::problem::Solution;
+use crate::prediction::Solution;
 use crate::progress::{Cancelled, Work};
 
 /// One statement.

@@ -50,7 +50,7 @@ impl Session {
             ));
             let settings = FitSettings::default();
             let measured = Measurements::new(&data.runs).with_faults(&data.faults);
-            fit::fit(&data.model, &measured, &settings, &work)?.comparison
+            fit(&data.model, &measured, &settings, &work)?.comparison
         } else {
             compare(&data.model, &data.measurements(), &work)?
         };

@@ -1,6 +1,6 @@
 //! The experiment that answers a question.
 
-use loopsight_diagnosis::{Limits, Question, QuestionError, experiment, place};
+use loopsight_diagnosis::{ExperimentLimits, Question, QuestionError, effect_at, experiment};
 use loopsight_model::model::Model as Composed;
 
 use crate::answers::ExperimentAnswer;
@@ -109,7 +109,7 @@ impl Session {
     /// itself.
     pub fn experiment(&self, options: &ExperimentOptions) -> Result<ExperimentAnswer> {
         let model = &self.model.composed;
-        let limits = Limits {
+        let limits = ExperimentLimits {
             limit: options.limit.unwrap_or_else(|| default_limit(model)),
             period: options.period_s,
             duration: options.duration_s,
@@ -126,9 +126,9 @@ fn question(ask: &Ask, model: &Composed) -> std::result::Result<Question, Questi
         Ask::All => Question::All,
         Ask::Pin(name) => Question::Pin(name.clone()),
         Ask::Separate(first, second) => {
-            Question::Separate(place(model, first)?, Some(place(model, second)?))
+            Question::Separate(effect_at(model, first)?, Some(effect_at(model, second)?))
         }
-        Ask::IsThere(effect) => Question::Separate(place(model, effect)?, None),
+        Ask::IsThere(effect) => Question::Separate(effect_at(model, effect)?, None),
     })
 }
 

@@ -122,7 +122,7 @@ impl Session {
             max_iterations: options.max_iterations,
         };
         let work = options.watch.work();
-        let engine = fit::fit(&data.model, &data.measurements(), &settings, &work)?;
+        let engine = fit(&data.model, &data.measurements(), &settings, &work)?;
         let text = self.fitted_text(&engine)?;
         let model = Model::from_toml(&self.model.file, &text)?;
         Ok(FitAnswer::new(

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use loopsight_diagnosis::{
-    Advice, Comparison, Conclusion, Diagnosis, Estimate, Explanation, Fit, Improvement, Level,
-    Method, Place, Statement, Step, Verdict,
+    Advice, Comparison, Conclusion, Diagnosis, EffectAt, Estimate, Explanation, Fit, Improvement,
+    ImprovementStep, Level, Method, ParameterVerdict, Statement,
 };
 use loopsight_model::model::Model;
 use loopsight_plants as _;
@@ -32,24 +32,24 @@ fn model(effects: usize) -> Model {
     model
 }
 
-fn place(effect: &str, at: &[&str]) -> Place {
-    Place {
+fn place(effect: &str, at: &[&str]) -> EffectAt {
+    EffectAt {
         effect: effect.into(),
         at: at.iter().map(|c| (*c).to_owned()).collect(),
     }
 }
 
-fn friction() -> Place {
+fn friction() -> EffectAt {
     place("coulomb_friction", &["wheel.right", "wheel.left"])
 }
 
-fn explanation(place: Place, nrmse: f64, name: &str) -> Explanation {
+fn explanation(place: EffectAt, nrmse: f64, name: &str) -> Explanation {
     let estimate = Estimate {
         value: 1.2,
         unit: "V".into(),
         std_error: Some(0.01),
         interval95: Some([1.18, 1.22]),
-        verdict: Verdict::Good,
+        verdict: ParameterVerdict::Good,
     };
     Explanation {
         place,
@@ -142,7 +142,7 @@ pub(crate) fn fit() -> Fit {
 /// Friction found, then `last`.
 pub(crate) fn improvement(last: Conclusion) -> Improvement {
     let best = diagnosis(last).model.is_some().then(fit);
-    let step = |added, nrmse_fit, nrmse_test| Step {
+    let step = |added, nrmse_fit, nrmse_test| ImprovementStep {
         round: 0,
         added,
         nrmse_fit,

@@ -1,6 +1,6 @@
 //! The page of a fit: parameters with their intervals, then the fitted model compared with the measurements.
 
-use loopsight_diagnosis::{Estimate, Fit, Verdict};
+use loopsight_diagnosis::{Estimate, Fit, ParameterVerdict};
 
 use crate::chart::{Abscissae, Chart, Role, Trace};
 use crate::comparison;
@@ -41,7 +41,7 @@ fn parameters(fit: &Fit) -> String {
     let (fitted, frozen): (Vec<_>, Vec<_>) = fit
         .parameters
         .iter()
-        .partition(|(_, e)| e.verdict != Verdict::Held);
+        .partition(|(_, e)| e.verdict != ParameterVerdict::Frozen);
     let intervals: Vec<Interval> = fitted
         .iter()
         .filter_map(|(name, e)| {
@@ -150,7 +150,7 @@ pub(crate) fn estimates(parameters: &[(&String, &Estimate)]) -> String {
                 Some([low, high]) => format!("{} … {}", bound(low), bound(high)),
                 None => "-".into(),
             };
-            let class = if e.verdict == Verdict::Good {
+            let class = if e.verdict == ParameterVerdict::Good {
                 "good"
             } else {
                 "doubtful"
@@ -197,16 +197,28 @@ pub(crate) mod tests {
             verdict,
         };
         [
-            ("K_A", estimate(-15.146, 0.31, "1/s", Verdict::Good)),
-            ("K_B", estimate(0.005, 0.02, "m", Verdict::NotPinned)),
-            ("K_C", estimate(0.136, 0.0028, "m/(s²·V)", Verdict::Good)),
-            ("K_D", estimate(-9.573, 0.12, "1/s", Verdict::Good)),
-            ("K_E", estimate(0.0, 0.0, "1/m", Verdict::Dead)),
+            (
+                "K_A",
+                estimate(-15.146, 0.31, "1/s", ParameterVerdict::Good),
+            ),
+            (
+                "K_B",
+                estimate(0.005, 0.02, "m", ParameterVerdict::NotPinned),
+            ),
+            (
+                "K_C",
+                estimate(0.136, 0.0028, "m/(s²·V)", ParameterVerdict::Good),
+            ),
+            ("K_D", estimate(-9.573, 0.12, "1/s", ParameterVerdict::Good)),
+            ("K_E", estimate(0.0, 0.0, "1/m", ParameterVerdict::Dead)),
             (
                 "coulomb_friction.level",
-                estimate(0.45, 0.02, "m/s²", Verdict::AtBound),
+                estimate(0.45, 0.02, "m/s²", ParameterVerdict::AtBound),
             ),
-            ("wheel_radius", estimate(0.05, 0.0, "m", Verdict::Held)),
+            (
+                "wheel_radius",
+                estimate(0.05, 0.0, "m", ParameterVerdict::Frozen),
+            ),
         ]
         .into_iter()
         .map(|(name, e)| (name.to_owned(), e))
@@ -225,7 +237,7 @@ pub(crate) mod tests {
             unit: "V s/rad".into(),
             std_error: Some(0.01),
             interval95: Some([1.18, 1.22]),
-            verdict: Verdict::Good,
+            verdict: ParameterVerdict::Good,
         };
         let mut fit = Fit {
             comparison: comparison(friction_runs(1, n)),

@@ -1,6 +1,6 @@
 //! The page of an improvement: the error falling, effect by effect.
 
-use loopsight_diagnosis::{Advice, Comparison, Diagnosis, Improvement, Step};
+use loopsight_diagnosis::{Advice, Comparison, Diagnosis, Improvement, ImprovementStep};
 
 use crate::bars::{Line, Scale};
 use crate::beside::Names;
@@ -74,7 +74,7 @@ pub fn improvement_page(
         let all: Vec<_> = best
             .parameters
             .iter()
-            .filter(|(_, e)| e.verdict != loopsight_diagnosis::Verdict::Held)
+            .filter(|(_, e)| e.verdict != loopsight_diagnosis::ParameterVerdict::Frozen)
             .collect();
         let flat: Vec<String> = best.flat.iter().map(|f| not_determined(f)).collect();
         body.push_str(&section(
@@ -99,7 +99,7 @@ pub fn improvement_page(
 }
 
 /// Bars of the fitted and the unseen error, step by step.
-fn steps(steps: &[Step], last: Option<&Diagnosis>) -> String {
+fn steps(steps: &[ImprovementStep], last: Option<&Diagnosis>) -> String {
     let floor = Line {
         name: "noise and resolution alone, on data not used in the fit",
         class: "floor",

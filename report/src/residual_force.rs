@@ -1,6 +1,6 @@
 //! A force that no effect of the library explains: what it looks like, and an expression to start from.
 
-use loopsight_diagnosis::{Bin, Curve, Dependence, ResidualForce};
+use loopsight_diagnosis::{ForceBin, ForceCurve, ForceDependence, ResidualForce};
 
 use crate::chart::{Abscissae, Chart, Role, Trace};
 use crate::html::{escape, marked, sentence, text};
@@ -60,7 +60,7 @@ pub(crate) fn residual_force(force: Option<&ResidualForce>) -> String {
     )
 }
 
-fn chart(force: &ResidualForce, of: &Dependence) -> Chart {
+fn chart(force: &ResidualForce, of: &ForceDependence) -> Chart {
     let turn = if of.period.is_some() {
         format!("{} within a turn", of.quantity)
     } else {
@@ -70,7 +70,7 @@ fn chart(force: &ResidualForce, of: &Dependence) -> Chart {
     chart.panel(axis("force", &force.unit), 220);
     for (at, curve) in of.curves.iter().enumerate() {
         let second = at > 0;
-        let column = |value: &dyn Fn(&Bin) -> f64| -> Vec<f64> {
+        let column = |value: &dyn Fn(&ForceBin) -> f64| -> Vec<f64> {
             curve
                 .bins
                 .iter()
@@ -102,7 +102,7 @@ fn chart(force: &ResidualForce, of: &Dependence) -> Chart {
     chart
 }
 
-fn name(curve: &Curve, what: &str) -> String {
+fn name(curve: &ForceCurve, what: &str) -> String {
     match curve.direction {
         "all" => what.to_owned(),
         direction => format!("{what}, {direction}"),
@@ -113,13 +113,13 @@ fn name(curve: &Curve, what: &str) -> String {
 mod tests {
     use super::*;
     use crate::fixtures::opened;
-    use loopsight_diagnosis::Expression;
+    use loopsight_diagnosis::ForceExpression;
 
     fn force() -> ResidualForce {
-        let curve = |direction, sign: f64| Curve {
+        let curve = |direction, sign: f64| ForceCurve {
             direction,
             bins: (0..8)
-                .map(|k| Bin {
+                .map(|k| ForceBin {
                     center: 0.8 * f64::from(k),
                     mean: sign * (1.6 * f64::from(k)).cos(),
                     std_error: 0.05,
@@ -133,14 +133,14 @@ mod tests {
             unit: "V".into(),
             statement: "the residual force at shaft depends on position: 62 % of its variance"
                 .into(),
-            depends_on: vec![Dependence {
+            depends_on: vec![ForceDependence {
                 quantity: "position".into(),
                 unit: "rad".into(),
                 period: Some(std::f64::consts::TAU),
                 share_of_variance: 0.62,
                 curves: vec![curve("forwards", 1.0), curve("backwards", -1.0)],
             }],
-            expression: Some(Expression {
+            expression: Some(ForceExpression {
                 force: "0.25 * flow * cos(2 * position)".into(),
                 share_of_variance: 0.98,
                 toml: "[[effect]]\n[effect.expression]\nat = [\"shaft\"]\n".into(),

@@ -13,7 +13,7 @@
 use std::fmt::Write as _;
 
 use loopsight_diagnosis::{
-    Conclusion, Diagnosis, Explanation, Measurements, Place, Work, diagnose,
+    Conclusion, Diagnosis, EffectAt, Explanation, Measurements, Work, diagnose,
 };
 use loopsight_hidden::{Experiment, Hidden, Robot, catalogue, record_with, refit};
 use loopsight_model::model::Model;
@@ -280,7 +280,7 @@ fn named(diagnosis: &Diagnosis, id: &str, at: &[&str]) -> bool {
 }
 
 /// Whether the effect is `first`, or in the class that `best` leads.
-fn among(first: &Place, best: &Explanation, id: &str, at: &[&str]) -> bool {
+fn among(first: &EffectAt, best: &Explanation, id: &str, at: &[&str]) -> bool {
     let mut class = vec![first];
     class.extend(&best.indistinguishable_from);
     // On an axis an effort at the load is one at the shaft times a constant.

@@ -12,7 +12,7 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use loopsight_diagnosis::fit::fit;
+use loopsight_diagnosis::fit;
 use loopsight_diagnosis::{FitSettings, Measurements, Method, Scheme, Work};
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_estimators as _;

@@ -12,11 +12,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use loopsight_core::{Derived, Parameter, Plant, PlantMeta, Real};
-use loopsight_diagnosis::fit::fit;
+use loopsight_diagnosis::fit;
 use loopsight_diagnosis::{
-    CancelToken, Cancelled, CompareError, Conclusion, Diagnosis, FitError, FitSettings, Limits,
-    Measurements, Method, Progress, Question, QuestionError, Work, compare, diagnose, experiment,
-    improve, residual_force,
+    CancelToken, Cancelled, CompareError, Conclusion, Diagnosis, ExperimentLimits, FitError,
+    FitSettings, Measurements, Method, Progress, Question, QuestionError, Work, compare, diagnose,
+    experiment, improve, residual_force,
 };
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_model::declare_plant;
@@ -254,7 +254,7 @@ fn an_improvement_keeps_its_finished_steps() {
 fn an_experiment_and_a_residual_force_end() {
     let _one = counting();
     let (model, runs) = (rough(), [log()]);
-    let limits = Limits {
+    let limits = ExperimentLimits {
         limit: 6.0,
         period: 0.01,
         duration: Some(10.0),

@@ -9,8 +9,8 @@
 
 use assert_cmd::Command;
 use loopsight_diagnosis::{
-    Conclusion, Diagnosis, Limits, Measurements, Plan, Promise, Question, Work, diagnose,
-    experiment, place,
+    Conclusion, Diagnosis, ExperimentLimits, Measurements, Plan, Promise, Question, Work, diagnose,
+    effect_at, experiment,
 };
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_hidden::{Hidden, Robot, record_along};
@@ -22,8 +22,8 @@ use tempfile::TempDir;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_loopsight-under-test");
 
-fn limits(limit: f64) -> Limits {
-    Limits {
+fn limits(limit: f64) -> ExperimentLimits {
+    ExperimentLimits {
         limit,
         period: PERIOD,
         duration: None,
@@ -31,14 +31,17 @@ fn limits(limit: f64) -> Limits {
 }
 
 fn separate(model: &Model, a: &str, b: &str) -> Plan {
-    let question = Question::Separate(place(model, a).unwrap(), Some(place(model, b).unwrap()));
+    let question = Question::Separate(
+        effect_at(model, a).unwrap(),
+        Some(effect_at(model, b).unwrap()),
+    );
     experiment(model, &question, &limits(9.0), &Work::quiet()).unwrap()
 }
 
 /// The Twil with an effect where it is tried first.
 fn hiding(effect: &str, values: &[f64]) -> Model {
     let plain = twil();
-    let at = place(&plain, effect).unwrap().at;
+    let at = effect_at(&plain, effect).unwrap().at;
     let at: Vec<&str> = at.iter().map(String::as_str).collect();
     let mut model = plain.with_effect(effect, &at).unwrap();
     let first = plain.parameters.len();
@@ -156,7 +159,7 @@ fn plans_keep_the_limit_begin_and_end_at_rest_and_repeat() {
     let questions = [
         Question::All,
         Question::Pin("K_D".to_owned()),
-        Question::Separate(place(&model, "dead_zone@input.left").unwrap(), None),
+        Question::Separate(effect_at(&model, "dead_zone@input.left").unwrap(), None),
     ];
     for (question, limit) in questions.into_iter().zip([3.0, 9.0, 6.0]) {
         let plan = experiment(&model, &question, &limits(limit), &Work::quiet()).unwrap();
@@ -180,7 +183,7 @@ fn plans_keep_the_limit_begin_and_end_at_rest_and_repeat() {
 fn a_pinned_parameter_comes_out_as_sharp_as_was_said() {
     let model = twil();
     let question = Question::Pin("K_E".to_owned());
-    let short = Limits {
+    let short = ExperimentLimits {
         duration: Some(20.0),
         ..limits(9.0)
     };
@@ -188,7 +191,7 @@ fn a_pinned_parameter_comes_out_as_sharp_as_was_said() {
     let predicted = 3.945 / plan.detectability;
     let run = record(&model, &plan, 7);
     let settings = loopsight_diagnosis::FitSettings::default();
-    let fit = loopsight_diagnosis::fit::fit(
+    let fit = loopsight_diagnosis::fit(
         &model,
         &Measurements::new(&[run]),
         &settings,

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_diagnosis::fit::fit;
+use loopsight_diagnosis::fit;
 use loopsight_diagnosis::{Conclusion, FitSettings, Measurements, Work, diagnose};
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_model::excitation::{Excitation, build, sample_rows};

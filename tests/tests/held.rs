@@ -8,10 +8,10 @@
 )]
 
 use assert_cmd::Command;
-use loopsight_diagnosis::fit::{Fit, fit};
+use loopsight_diagnosis::{Fit, fit};
 use loopsight_diagnosis::{
-    Because, Conclusion, FitSettings, Limits, Measurements, Question, QuestionError, Work, compare,
-    diagnose, experiment,
+    Because, Conclusion, ExperimentLimits, FitSettings, Measurements, Question, QuestionError,
+    Work, compare, diagnose, experiment,
 };
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
@@ -201,7 +201,7 @@ fn an_axis_that_drifts_is_diagnosed() {
 /// A pole falls whatever was planned; an axis that drifts can still be driven.
 #[test]
 fn no_experiment_is_planned_for_what_falls_over() {
-    let limits = Limits {
+    let limits = ExperimentLimits {
         duration: Some(5.0),
         limit: 2.0,
         period: PERIOD,

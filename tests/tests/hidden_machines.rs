@@ -17,7 +17,7 @@ fn explained(robot: Robot) {
     let (model, _) = Model::from_toml("hidden", &log.model_toml).unwrap();
     let settings = FitSettings::default();
     let tests = [test.run.clone()];
-    let found = fit::fit(
+    let found = fit(
         &model,
         &Measurements::new(std::slice::from_ref(&log.run)).tested_on(Some(&tests)),
         &settings,

@@ -6,7 +6,7 @@
     reason = "what is built here is right, and a panic is how this program fails"
 )]
 
-use loopsight_diagnosis::{Fit, FitSettings, Measurements, Method, Scheme, Work, fit::fit};
+use loopsight_diagnosis::{Fit, FitSettings, Measurements, Method, Scheme, Work, fit};
 use loopsight_model::model::Model;
 use loopsight_model::run::{Rows, Run};
 use loopsight_model::sensor::Sensor;

@@ -199,7 +199,7 @@ fn noise_has_no_shape() {
 fn described(robot: Robot, run: &Run) -> Option<ResidualForce> {
     let model = Model::from_toml("hidden", &robot.model_toml()).unwrap().0;
     let runs = std::slice::from_ref(run);
-    let fitted = fit::fit(
+    let fitted = fit(
         &model,
         &Measurements::new(runs),
         &FitSettings::default(),
@@ -222,7 +222,7 @@ fn the_printed_expression_makes_the_error_fall() {
         let runs = std::slice::from_ref(&run);
         let fitted = |text: &str| {
             let model = Model::from_toml("hidden", text).unwrap().0;
-            fit::fit(
+            fit(
                 &model,
                 &Measurements::new(runs),
                 &FitSettings::default(),

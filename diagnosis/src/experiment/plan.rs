@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-use crate::Place;
+use crate::EffectAt;
 
 /// What an experiment is to answer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Question {
     /// Which of two effects it is; `None`: whether it is there at all.
-    Separate(Place, Option<Place>),
+    Separate(EffectAt, Option<EffectAt>),
     /// The value of a parameter, by its name in the model.
     Pin(String),
     /// The values of all parameters that a fit estimates.
@@ -17,7 +17,7 @@ pub enum Question {
 
 /// What the robot allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct ExperimentLimits {
     /// Largest magnitude of every input, in its SI unit.
     pub limit: f64,
     /// Sampling period, s.
@@ -57,7 +57,7 @@ pub struct Plan {
     /// How long it has to take, s; infinite when no length is enough.
     pub needed_s: f64,
     /// The effects it separates.
-    pub separates: Vec<Place>,
+    pub separates: Vec<EffectAt>,
     /// The parameters it pins.
     pub pins: Vec<String>,
     /// Effects: their distance in standard deviations. Parameters: value (or noticeable change, if

@@ -1,14 +1,14 @@
 //! What is asked: effects and parameters by name, and models that have them at a noticeable size.
 
-use loopsight_core::{EffectMeta, Place as Where};
+use loopsight_core::{EffectMeta, Place};
 use loopsight_model::config::nearest;
 use loopsight_model::model::{Model, misfit};
 use loopsight_model::registry::{self, BuildError};
 
-use crate::Place;
+use crate::EffectAt;
 use crate::candidates::{channel_sets, suit};
 use crate::criteria::Criteria;
-use crate::experiment::Limits;
+use crate::experiment::ExperimentLimits;
 use crate::progress::Cancelled;
 
 /// Why a question cannot be answered.
@@ -123,7 +123,7 @@ fn hint(near: Option<&str>, otherwise: &str) -> String {
 /// # Errors
 ///
 /// [`QuestionError`] when there is no such effect or channel, or the effect does not fit.
-pub fn place(model: &Model, text: &str) -> Result<Place, QuestionError> {
+pub fn effect_at(model: &Model, text: &str) -> Result<EffectAt, QuestionError> {
     let (name, channels) = match text.split_once('@') {
         Some((name, channels)) => (name, Some(channels)),
         None => (text, None),
@@ -158,7 +158,7 @@ pub fn place(model: &Model, text: &str) -> Result<Place, QuestionError> {
     if present {
         return Err(QuestionError::Present { effect, at });
     }
-    Ok(Place { effect, at })
+    Ok(EffectAt { effect, at })
 }
 
 fn channel(model: &Model, meta: &EffectMeta, id: &str) -> Result<String, QuestionError> {
@@ -198,7 +198,7 @@ pub(super) fn parameter(model: &Model, name: &str) -> Result<usize, QuestionErro
 /// Most samples of an experiment.
 const MOST_SAMPLES: f64 = 1e6;
 
-pub(super) fn check(model: &Model, limits: &Limits) -> Result<(), QuestionError> {
+pub(super) fn check(model: &Model, limits: &ExperimentLimits) -> Result<(), QuestionError> {
     let missing = model.missing_values();
     if !missing.is_empty() {
         let names = missing.iter().map(|n| (*n).to_owned()).collect();
@@ -219,7 +219,7 @@ pub(super) fn check(model: &Model, limits: &Limits) -> Result<(), QuestionError>
             expected,
         })
     };
-    let Limits {
+    let ExperimentLimits {
         limit,
         period,
         duration,
@@ -249,7 +249,7 @@ pub(super) struct Direction {
 
 /// Two rivals, ready to be simulated and fitted.
 pub(super) struct Rivals {
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<EffectAt>,
     /// Which is true and which is fitted.
     pub(super) directions: Vec<Direction>,
     /// At which sizes, in words.
@@ -258,14 +258,14 @@ pub(super) struct Rivals {
 
 pub(super) fn rivals(
     model: &Model,
-    a: &Place,
-    b: Option<&Place>,
+    a: &EffectAt,
+    b: Option<&EffectAt>,
     rms: &[f64],
     limit: f64,
     criteria: &Criteria,
 ) -> Result<Rivals, QuestionError> {
     let sign_width = criteria.search.sign_width;
-    let with = |place: &Place| Side::new(model, place, rms, limit, sign_width);
+    let with = |place: &EffectAt| Side::new(model, place, rms, limit, sign_width);
     let first = with(a)?;
     let Some(b) = b else {
         return Ok(Rivals {
@@ -308,7 +308,7 @@ pub(super) fn rivals(
 
 impl Rivals {
     pub(super) fn names(&self) -> String {
-        let of = |p: &Place| format!("{} at {}", p.effect, p.at.join("+"));
+        let of = |p: &EffectAt| format!("{} at {}", p.effect, p.at.join("+"));
         match &self.places[..] {
             [one] => format!("{} and a model without it", of(one)),
             list => list.iter().map(of).collect::<Vec<_>>().join(" and "),
@@ -354,7 +354,7 @@ const MET: f64 = 0.7;
 
 /// One of the two.
 struct Side {
-    place: Place,
+    place: EffectAt,
     meta: &'static EffectMeta,
     model: Model,
     /// Its values at a noticeable size.
@@ -366,7 +366,7 @@ struct Side {
 impl Side {
     fn new(
         model: &Model,
-        place: &Place,
+        place: &EffectAt,
         rms: &[f64],
         limit: f64,
         sign_width: f64,
@@ -383,7 +383,7 @@ impl Side {
         let on_input = with
             .effects
             .last()
-            .is_some_and(|e| e.at.iter().all(|c| matches!(c.place, Where::Input(_))));
+            .is_some_and(|e| e.at.iter().all(|c| matches!(c.place, Place::Input(_))));
         let mut truth = with.values();
         let mut others: Vec<(usize, f64)> = Vec::new();
         for (i, parameter) in with.parameters.iter().enumerate().skip(first) {

@@ -12,7 +12,7 @@ use super::filter::Filtered;
 use super::place::{Group, Law};
 use super::response::{Column, Responses, responses};
 use super::shape::Variable;
-use crate::problem::Solution;
+use crate::prediction::Solution;
 use crate::progress::{Cancelled, Work};
 
 /// Bins of a quantity.
@@ -25,7 +25,7 @@ const RIDGE: f64 = 1e-3;
 
 /// How a force depends on one quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Dependence {
+pub struct ForceDependence {
     /// The quantity, by its name in an expression.
     pub quantity: String,
     /// Its unit.
@@ -36,21 +36,21 @@ pub struct Dependence {
     /// that the mean was not taken from: chance gives nothing.
     pub share_of_variance: f64,
     /// The mean force over the quantity: one curve for either direction of motion, or one for all.
-    pub curves: Vec<Curve>,
+    pub curves: Vec<ForceCurve>,
 }
 
 /// A mean force over a quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Curve {
+pub struct ForceCurve {
     /// `forwards`, `backwards`, or `all`.
     pub direction: &'static str,
     /// In the order of the quantity.
-    pub bins: Vec<Bin>,
+    pub bins: Vec<ForceBin>,
 }
 
 /// A stretch of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Bin {
+pub struct ForceBin {
     /// Mean of the quantity.
     pub center: f64,
     /// Mean force.
@@ -64,7 +64,7 @@ pub struct Bin {
 }
 
 /// The model held to the measurements, as the responses need it.
-pub(super) struct Held<'a> {
+pub(super) struct Followed<'a> {
     pub(super) model: &'a Model,
     pub(super) solution: &'a Solution,
     pub(super) runs: &'a [Run],
@@ -85,13 +85,13 @@ struct Sorted {
 /// How the force at the channels `at` of `group` depends on each quantity there, the most telling
 /// first.
 pub(super) fn dependences(
-    held: &Held<'_>,
+    held: &Followed<'_>,
     group: &Group,
     at: &[usize],
     laws: &[Law],
     work: &Work<'_>,
-) -> Result<Vec<Dependence>, Cancelled> {
-    let mut all: Vec<Dependence> = (0..group.quantities.len())
+) -> Result<Vec<ForceDependence>, Cancelled> {
+    let mut all: Vec<ForceDependence> = (0..group.quantities.len())
         .filter_map(|q| dependence(held, group, at, laws, q, work).transpose())
         .collect::<Result<_, Cancelled>>()?;
     all.sort_by(|a, b| b.share_of_variance.total_cmp(&a.share_of_variance));
@@ -99,13 +99,13 @@ pub(super) fn dependences(
 }
 
 fn dependence(
-    held: &Held<'_>,
+    held: &Followed<'_>,
     group: &Group,
     at: &[usize],
     laws: &[Law],
     quantity: usize,
     work: &Work<'_>,
-) -> Result<Option<Dependence>, Cancelled> {
+) -> Result<Option<ForceDependence>, Cancelled> {
     let of = &group.quantities[quantity];
     let flow = group
         .quantities
@@ -164,12 +164,12 @@ fn dependence(
     let curves = directions
         .iter()
         .zip(&sorted)
-        .map(|((direction, _), part)| Curve {
+        .map(|((direction, _), part)| ForceCurve {
             direction,
             bins: (0..part.center.len())
                 .filter_map(|bin| {
                     let (mean, std_error) = means.next()?;
-                    (part.count[bin] >= work.criteria().force.fewest).then(|| Bin {
+                    (part.count[bin] >= work.criteria().force.fewest).then(|| ForceBin {
                         center: part.center[bin],
                         mean,
                         std_error,
@@ -181,7 +181,7 @@ fn dependence(
         })
         .filter(|curve| !curve.bins.is_empty())
         .collect();
-    Ok(Some(Dependence {
+    Ok(Some(ForceDependence {
         quantity: of.variable.name().to_owned(),
         unit: of.unit.clone(),
         period: of.turns.then_some(TAU),

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::criteria::LogCriteria;
 use crate::floor::noise;
-use crate::problem::Solution;
+use crate::prediction::Solution;
 use crate::progress::{Cancelled, Work};
 
 /// Sizes of the unknown force that are tried, in the size of the channels.

@@ -15,13 +15,12 @@ use loopsight_model::run::Run;
 use nalgebra::DVector;
 use serde::Serialize;
 
-pub use dependence::{Bin, Curve, Dependence};
+pub use dependence::{ForceBin, ForceCurve, ForceDependence};
 
-use crate::prediction::InitialStates;
-use crate::problem::Solution;
+use crate::prediction::{InitialStates, Solution};
 use crate::progress::{Cancelled, Work};
 use blocks::Blocks;
-use dependence::{Held, dependences};
+use dependence::{Followed, dependences};
 use filter::filter;
 use place::{Group, Way, groups};
 use response::{Column, responses};
@@ -43,14 +42,14 @@ pub struct ResidualForce {
     /// What it depends on, in words.
     pub statement: String,
     /// Quantities it depends on, the most telling first.
-    pub depends_on: Vec<Dependence>,
+    pub depends_on: Vec<ForceDependence>,
     /// An expression to begin with; `null` where none stands out from the noise.
-    pub expression: Option<Expression>,
+    pub expression: Option<ForceExpression>,
 }
 
 /// A force as an expression, to be edited.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Expression {
+pub struct ForceExpression {
     /// The expression with its numbers.
     pub force: String,
     /// Share of the residual force's variance that it accounts for, on blocks of time that its
@@ -154,7 +153,7 @@ pub(crate) fn of_solution(
         terms => found.group.laws(found.way, terms, numbers),
     };
     let at = found.group.at(found.way);
-    let held = Held {
+    let held = Followed {
         model,
         solution,
         runs,
@@ -172,7 +171,7 @@ pub(crate) fn of_solution(
         .collect();
     let expression = (!laws.is_empty()).then(|| {
         let (toml, force) = written(&found.group, &laws);
-        Expression {
+        ForceExpression {
             force,
             share_of_variance: share,
             toml,

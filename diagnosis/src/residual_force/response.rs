@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::filter::{Filtered, innovation};
-use crate::problem::Solution;
+use crate::prediction::Solution;
 use crate::progress::{Cancelled, Work};
 
 /// Something that could be different, by one unit.

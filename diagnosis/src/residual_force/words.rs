@@ -2,7 +2,7 @@
 
 use loopsight_model::expression::{EffectDraft, ParameterDraft};
 
-use super::dependence::Dependence;
+use super::dependence::ForceDependence;
 use super::place::{Group, Law};
 use super::shape::{Shape, Variable};
 
@@ -23,7 +23,7 @@ fn both(names: &[String]) -> String {
 /// What the force depends on; shares below `telling` are not worth a word.
 pub(super) fn statement(
     at: &[String],
-    depends_on: &[Dependence],
+    depends_on: &[ForceDependence],
     expression: Option<(&[Law], f64)>,
     telling: f64,
 ) -> String {

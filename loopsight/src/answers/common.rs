@@ -110,8 +110,8 @@ pub struct Correction {
     pub statement: String,
 }
 
-impl From<&loopsight_diagnosis::Held> for Correction {
-    fn from(held: &loopsight_diagnosis::Held) -> Self {
+impl From<&loopsight_diagnosis::Correction> for Correction {
+    fn from(held: &loopsight_diagnosis::Correction) -> Self {
         Self {
             because: held.because.into(),
             horizon_s: held.horizon_s,
@@ -212,8 +212,8 @@ pub struct EffectAt {
     pub at: Vec<String>,
 }
 
-impl From<&loopsight_diagnosis::Place> for EffectAt {
-    fn from(place: &loopsight_diagnosis::Place) -> Self {
+impl From<&loopsight_diagnosis::EffectAt> for EffectAt {
+    fn from(place: &loopsight_diagnosis::EffectAt) -> Self {
         Self {
             effect: place.effect.clone(),
             at: place.at.clone(),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use loopsight_core::Signal;
-use loopsight_diagnosis::{Limits, Plan};
+use loopsight_diagnosis::{ExperimentLimits, Plan};
 use loopsight_recordings::{header, write_csv};
 use serde::Serialize;
 
@@ -85,7 +85,7 @@ impl Answer for ExperimentAnswer {
 }
 
 impl ExperimentAnswer {
-    pub(crate) fn new(engine: Plan, limits: &Limits, inputs: &'static [Signal]) -> Self {
+    pub(crate) fn new(engine: Plan, limits: &ExperimentLimits, inputs: &'static [Signal]) -> Self {
         Self {
             schema: Self::SCHEMA,
             experiment: engine.experiment.clone(),

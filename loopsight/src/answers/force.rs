@@ -97,8 +97,8 @@ impl From<&loopsight_diagnosis::ResidualForce> for MissingForce {
     }
 }
 
-impl From<&loopsight_diagnosis::Dependence> for ForceDependence {
-    fn from(dependence: &loopsight_diagnosis::Dependence) -> Self {
+impl From<&loopsight_diagnosis::ForceDependence> for ForceDependence {
+    fn from(dependence: &loopsight_diagnosis::ForceDependence) -> Self {
         Self {
             quantity: dependence.quantity.clone(),
             unit: dependence.unit.clone(),
@@ -109,8 +109,8 @@ impl From<&loopsight_diagnosis::Dependence> for ForceDependence {
     }
 }
 
-impl From<&loopsight_diagnosis::Curve> for ForceCurve {
-    fn from(curve: &loopsight_diagnosis::Curve) -> Self {
+impl From<&loopsight_diagnosis::ForceCurve> for ForceCurve {
+    fn from(curve: &loopsight_diagnosis::ForceCurve) -> Self {
         Self {
             direction: curve.direction.to_owned(),
             bins: all(&curve.bins),
@@ -118,8 +118,8 @@ impl From<&loopsight_diagnosis::Curve> for ForceCurve {
     }
 }
 
-impl From<&loopsight_diagnosis::Bin> for ForceBin {
-    fn from(bin: &loopsight_diagnosis::Bin) -> Self {
+impl From<&loopsight_diagnosis::ForceBin> for ForceBin {
+    fn from(bin: &loopsight_diagnosis::ForceBin) -> Self {
         Self {
             center: bin.center,
             mean: bin.mean,

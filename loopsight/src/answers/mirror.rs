@@ -54,11 +54,12 @@ mirror! {
 
 mirror! {
     /// What the data say of a parameter.
-    ParameterVerdict of loopsight_diagnosis::Verdict {
+    ParameterVerdict of loopsight_diagnosis::ParameterVerdict {
         /// Pinned by the data.
         Good,
         /// Not estimated: it keeps the value of the file.
-        Held,
+        #[serde(rename = "held")]
+        Frozen,
         /// Without influence on what is measured in this recording.
         Dead,
         /// Only a combination with other parameters is determined.
@@ -147,7 +148,7 @@ mirror! {
 impl ParameterVerdict {
     /// In words.
     pub fn text(self) -> &'static str {
-        loopsight_diagnosis::Verdict::from(self).text()
+        loopsight_diagnosis::ParameterVerdict::from(self).text()
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a diagnosis concludes.
 
-use loopsight_diagnosis::{Conclusion, Diagnosis, Explanation, Place};
+use loopsight_diagnosis::{Conclusion, Diagnosis, EffectAt, Explanation};
 
 use super::advice;
 use super::comparison::where_it_fails;
@@ -203,7 +203,7 @@ pub(crate) fn significance(standard_errors: f64) -> String {
 
 /// `with coulomb_friction` for a legend: the effect that is missing, or the one that comes nearest.
 pub(crate) fn with_effect(diagnosis: &Diagnosis) -> String {
-    let name = |of: &Place| format!("with {}", of.effect);
+    let name = |of: &EffectAt| format!("with {}", of.effect);
     match (found(diagnosis), diagnosis.candidates.first()) {
         (Some(best), _) => name(&best.place),
         (None, Some(nearest)) => name(&nearest.place) + ", the best candidate",

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_diagnosis::{Estimate, Fit, Method, Verdict};
+use loopsight_diagnosis::{Estimate, Fit, Method, ParameterVerdict};
 
 use super::comparison;
 use super::number::{error, number};
@@ -16,7 +16,12 @@ pub fn summary(fit: &Fit) -> Vec<String> {
         by_verdict(&fit.parameters)
             .iter()
             .filter(|(verdict, _)| {
-                !matches!(verdict, Verdict::Good | Verdict::Held | Verdict::Unfinished)
+                !matches!(
+                    verdict,
+                    ParameterVerdict::Good
+                        | ParameterVerdict::Frozen
+                        | ParameterVerdict::Unfinished
+                )
             })
             .map(|(verdict, names)| format!("{}: {}.", names.join(", "), verdict.text())),
     );
@@ -60,8 +65,8 @@ fn error_fell(fit: &Fit) -> String {
 }
 
 /// Parameters by what the data say of them, in the order of their names.
-fn by_verdict(parameters: &BTreeMap<String, Estimate>) -> Vec<(Verdict, Vec<&str>)> {
-    let mut verdicts: Vec<(Verdict, Vec<&str>)> = Vec::new();
+fn by_verdict(parameters: &BTreeMap<String, Estimate>) -> Vec<(ParameterVerdict, Vec<&str>)> {
+    let mut verdicts: Vec<(ParameterVerdict, Vec<&str>)> = Vec::new();
     for (name, p) in parameters {
         match verdicts
             .iter_mut()

@@ -1,6 +1,6 @@
 //! What an improvement came to.
 
-use loopsight_diagnosis::{Conclusion, Improvement, Place, Step, Verdict};
+use loopsight_diagnosis::{Conclusion, EffectAt, Improvement, ImprovementStep, ParameterVerdict};
 
 use super::diagnosis::{self, Said};
 use super::number::{error, hundredths};
@@ -84,7 +84,7 @@ fn rest(verdict: Conclusion, floor: &str) -> String {
 }
 
 /// The effects that an improvement has added: those of the best model, where there is one.
-pub fn added(improvement: &Improvement) -> Vec<Place> {
+pub fn added(improvement: &Improvement) -> Vec<EffectAt> {
     let before = improvement
         .diagnoses
         .first()
@@ -96,7 +96,7 @@ pub fn added(improvement: &Improvement) -> Vec<Place> {
             .effects
             .iter()
             .skip(before)
-            .map(|effect| Place {
+            .map(|effect| EffectAt {
                 effect: effect.meta.id.to_owned(),
                 at: effect.at.iter().map(|c| c.id.to_owned()).collect(),
             })
@@ -110,7 +110,7 @@ pub fn added(improvement: &Improvement) -> Vec<Place> {
 }
 
 /// What the data could not tell from the effect of a step.
-fn not_told(improvement: &Improvement, step: &Step) -> Option<String> {
+fn not_told(improvement: &Improvement, step: &ImprovementStep) -> Option<String> {
     let others: Vec<String> = improvement
         .not_told_from(step)
         .into_iter()
@@ -125,7 +125,7 @@ fn not_told(improvement: &Improvement, step: &Step) -> Option<String> {
 }
 
 /// Which parameters of the added effects the data do not pin.
-fn not_pinned(improvement: &Improvement, added: &[Place]) -> Option<String> {
+fn not_pinned(improvement: &Improvement, added: &[EffectAt]) -> Option<String> {
     let of_effect = |name: &str| added.iter().any(|place| name.starts_with(&place.effect));
     let names: Vec<&str> = improvement
         .best
@@ -143,8 +143,11 @@ fn not_pinned(improvement: &Improvement, added: &[Place]) -> Option<String> {
 }
 
 /// Whether the data leave a parameter open.
-fn doubtful(verdict: Verdict) -> bool {
-    !matches!(verdict, Verdict::Good | Verdict::Held | Verdict::Unfinished)
+fn doubtful(verdict: ParameterVerdict) -> bool {
+    !matches!(
+        verdict,
+        ParameterVerdict::Good | ParameterVerdict::Frozen | ParameterVerdict::Unfinished
+    )
 }
 
 /// An improvement for a terminal: the error step by step, summary, the force that is missing, and the best

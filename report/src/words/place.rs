@@ -1,10 +1,10 @@
 //! Effects and where they act.
 
-use loopsight_diagnosis::Place;
+use loopsight_diagnosis::EffectAt;
 use loopsight_model::registry;
 
 /// An effect and where it acts, for a sentence: `coulomb_friction at wheel.right and wheel.left`.
-pub fn place(place: &Place) -> String {
+pub fn place(place: &EffectAt) -> String {
     if place.at.is_empty() {
         place.effect.clone()
     } else {
@@ -13,12 +13,12 @@ pub fn place(place: &Place) -> String {
 }
 
 /// An effect and where it acts, for a table: `coulomb_friction @ wheel.right+wheel.left`.
-pub fn place_in_table(place: &Place) -> String {
+pub fn place_in_table(place: &EffectAt) -> String {
     format!("{} @ {}", place.effect, place.at.join("+"))
 }
 
 /// An effect and where it acts, for a command: `coulomb_friction@wheel.right+wheel.left`.
-pub fn place_to_type(place: &Place) -> String {
+pub fn place_to_type(place: &EffectAt) -> String {
     if place.at.is_empty() {
         place.effect.clone()
     } else {
@@ -27,7 +27,7 @@ pub fn place_to_type(place: &Place) -> String {
 }
 
 /// An effect and where it acts, for an enumeration: `coulomb_friction (wheel.right, wheel.left)`.
-pub(crate) fn place_in_brackets(place: &Place) -> String {
+pub(crate) fn place_in_brackets(place: &EffectAt) -> String {
     if place.at.is_empty() {
         place.effect.clone()
     } else {
@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn a_place_is_said_typed_and_listed() {
-        let friction = Place {
+        let friction = EffectAt {
             effect: "coulomb_friction".into(),
             at: ["a", "b", "c"].map(str::to_owned).to_vec(),
         };
@@ -69,7 +69,7 @@ mod tests {
         assert_eq!(place_in_table(&friction), "coulomb_friction @ a+b+c");
         assert_eq!(place_to_type(&friction), "coulomb_friction@a+b+c");
         assert_eq!(place_in_brackets(&friction), "coulomb_friction (a, b, c)");
-        let nowhere = Place {
+        let nowhere = EffectAt {
             at: vec![],
             ..friction
         };

@@ -1,0 +1,54 @@
+//! What a fit says of one parameter.
+
+use serde::Serialize;
+
+/// What a fit says of one parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ParameterVerdict {
+    /// Pinned by the data.
+    Good,
+    /// Not estimated: frozen at the value of the file.
+    #[serde(rename = "held")]
+    Frozen,
+    /// Has no influence on what is measured in this recording.
+    Dead,
+    /// Only a combination with other parameters is determined.
+    Flat,
+    /// The interval is wider than the value.
+    NotPinned,
+    /// Rests on the end of its admissible range.
+    AtBound,
+    /// The fit was cancelled before it could say.
+    Unfinished,
+}
+
+impl ParameterVerdict {
+    /// In words.
+    pub fn text(self) -> &'static str {
+        match self {
+            ParameterVerdict::Good => "pinned by the data",
+            ParameterVerdict::Frozen => "held at the file's value",
+            ParameterVerdict::Dead => "no influence on what is measured here",
+            ParameterVerdict::Flat => "only a combination with other parameters is determined",
+            ParameterVerdict::NotPinned => "interval wider than the value",
+            ParameterVerdict::AtBound => "at the end of its range",
+            ParameterVerdict::Unfinished => "the fit was cancelled",
+        }
+    }
+}
+
+/// One estimated parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// Its unit.
+    pub unit: String,
+    /// Standard error, in that unit; `null` where the data say nothing.
+    pub std_error: Option<f64>,
+    /// Interval that holds the true value with 95 % confidence.
+    pub interval95: Option<[f64; 2]>,
+    /// What the data say of it.
+    pub verdict: ParameterVerdict,
+}

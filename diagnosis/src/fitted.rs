@@ -1,0 +1,78 @@
+//! The result of a fit.
+
+use std::collections::BTreeMap;
+
+use loopsight_model::model::Model;
+use serde::Serialize;
+
+use crate::compare::Comparison;
+use crate::derived::derived;
+use crate::estimate::{Estimate, ParameterVerdict};
+use crate::settings::Method;
+
+/// The result of a fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Fit {
+    /// The fitted model held against the recording it was fitted to (or the test recording).
+    #[serde(flatten)]
+    pub comparison: Comparison,
+    /// The parameters by name.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// What follows from the plant's parameters, by name: see [`loopsight_core::Derived`].
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived: BTreeMap<String, Estimate>,
+    /// How they were found.
+    pub method: Method,
+    /// Free-run error before the fit; absent where the file gave no values.
+    pub nrmse_before: Option<f64>,
+    /// Free-run error on the recording it was fitted to.
+    pub nrmse_fit: f64,
+    /// Iterations (output error) or samples (recursive least squares).
+    pub iterations: u64,
+    /// Combinations of parameters that the data do not determine, in words.
+    pub flat: Vec<String>,
+    /// The work was cancelled: these are the best values found until then. Errors of values and errors by
+    /// signal are missing where there was no time for them.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub cancelled: bool,
+    /// The fitted model.
+    #[serde(skip)]
+    pub model: Model,
+    /// Convergence of the estimate over the samples, for recursive least squares: name, then
+    /// (time, value).
+    #[serde(skip)]
+    pub history: Vec<(String, Vec<(f64, f64)>)>,
+}
+
+impl Fit {
+    /// What is left of a fit that was cancelled: the values of `model`, which leave an error of `nrmse`.
+    pub(crate) fn cancelled(model: Model, method: Method, nrmse: f64, iterations: u64) -> Self {
+        let parameters = model.parameters.iter().filter_map(|parameter| {
+            let estimate = Estimate {
+                value: parameter.value?,
+                unit: parameter.unit.clone(),
+                std_error: None,
+                interval95: None,
+                verdict: if parameter.free {
+                    ParameterVerdict::Unfinished
+                } else {
+                    ParameterVerdict::Frozen
+                },
+            };
+            Some((parameter.name.clone(), estimate))
+        });
+        Self {
+            comparison: Comparison::of_error(nrmse),
+            parameters: parameters.collect(),
+            derived: derived(&model, None),
+            method,
+            nrmse_before: None,
+            nrmse_fit: nrmse,
+            iterations,
+            flat: Vec::new(),
+            cancelled: true,
+            model,
+            history: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! What an improvement says.
+
+use serde::Serialize;
+
+use crate::conclusion::{Conclusion, Diagnosis, EffectAt};
+use crate::fitted::Fit;
+
+/// One step of an improvement.
+#[derive(Clone, Debug, Serialize)]
+pub struct ImprovementStep {
+    /// What was added, under the name that it has in the best model; `null` for the model as it was.
+    pub added: Option<EffectAt>,
+    /// The round whose diagnosis named it: its place among [`Improvement::diagnoses`].
+    #[serde(skip)]
+    pub round: usize,
+    /// Free-run error on what the model was fitted to.
+    pub nrmse_fit: f64,
+    /// Free-run error on what it was not fitted to.
+    pub nrmse_test: f64,
+}
+
+/// The result of [`improve`].
+#[derive(Debug, Serialize)]
+pub struct Improvement {
+    /// The model as it was, then each addition.
+    pub steps: Vec<ImprovementStep>,
+    /// What the last diagnosis concludes.
+    pub verdict: Conclusion,
+    /// The diagnoses, one per round.
+    #[serde(skip)]
+    pub diagnoses: Vec<Diagnosis>,
+    /// The best model, fitted to all of the log; none where a diagnosis was refused.
+    #[serde(skip)]
+    pub best: Option<Fit>,
+}
+
+impl Improvement {
+    /// What the data could not tell from the effect of a step when it was added.
+    pub fn not_told_from(&self, step: &ImprovementStep) -> Vec<&EffectAt> {
+        let named = self
+            .diagnoses
+            .get(step.round)
+            .and_then(|d| d.candidates.first());
+        let (Some(added), Some(named)) = (&step.added, named) else {
+            return Vec::new();
+        };
+        std::iter::once(&named.place)
+            .chain(&named.indistinguishable_from)
+            .filter(|place| *place != added)
+            .collect()
+    }
+}
