@@ -1,0 +1,133 @@
+//! No value that the types of the library `loopsight` allow makes it panic: arrays of odd lengths, times that
+//! run backwards, numbers that are none, text that is no TOML.
+
+use loopsight::answers::Answer as _;
+use loopsight::{
+    AddOptions, Ask, CompareOptions, Experiment, ExperimentOptions, FitOptions, Log, Loop, Method,
+    Model, Session, SimulateOptions, explain,
+};
+use proptest::collection::vec;
+use proptest::num::f64::ANY;
+use proptest::prelude::*;
+
+const MODEL: &str = "[plant.oscillator]\nstiffness_per_mass = 40.0\ndamping_per_mass = 1.0\n\
+    inverse_mass = 2.0\n[log.measured.position]\n";
+
+fn model() -> Model {
+    Model::from_toml("spring.toml", MODEL).unwrap_or_else(|e| unreachable!("{e}"))
+}
+
+/// Any number, or one of a size that a log has.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![ANY, -10.0..10.0f64, Just(f64::NAN), Just(0.0)]
+}
+
+/// Times that increase by fits and starts, sometimes.
+fn times() -> impl Strategy<Value = Vec<f64>> {
+    prop_oneof![
+        vec(number(), 0..40),
+        vec(0.001..0.2f64, 0..40).prop_map(|steps| {
+            let sum = |t: &mut f64, step: f64| {
+                *t += step;
+                Some(*t)
+            };
+            steps.into_iter().scan(0.0, sum).collect()
+        }),
+    ]
+}
+
+/// Pieces of model, loop and experiment files, and of what is none.
+fn text() -> impl Strategy<Value = String> {
+    let pieces = prop::sample::select(vec![
+        "[plant.oscillator]\n",
+        "[plant.",
+        "stiffness_per_mass = ",
+        "duration_s = ",
+        "period_s = ",
+        "model = \"nowhere.toml\"\n",
+        "[driver.simulated]\n",
+        "[controller.pid]\n",
+        "[inputs]\n",
+        "force = { steps = { at = [[0.0, 1.0]] } }\n",
+        "[[effect]]\n[effect.coulomb_friction]\nat = [\"mass\"]\n",
+        "1e999",
+        "-1.0\n",
+        "0.5\n",
+        "nan\n",
+        "\"",
+        "]]",
+        "\u{0}",
+        "ü",
+    ]);
+    vec(pieces, 0..12).prop_map(|pieces| pieces.concat())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+    #[test]
+    fn logs_of_any_arrays_end_with_an_answer_or_an_error(
+        time in times(),
+        force in vec(number(), 0..40),
+        position in vec(number(), 0..40),
+        alike in any::<bool>(),
+        rows in (0..50usize, 0..50usize),
+    ) {
+        let n = if alike { time.len().min(force.len()).min(position.len()) } else { usize::MAX };
+        let cut = |values: &[f64]| values[..values.len().min(n)].to_vec();
+        let log = Log::in_memory("any")
+            .column("time", "s", cut(&time))
+            .column("force", "N", cut(&force))
+            .column("position", "mm", cut(&position))
+            .build();
+        let Ok(log) = log else { return Ok(()) };
+        let _ = (log.runs(), log.rows(), log.columns());
+        let _ = Session::new(model(), log.part(rows.0..rows.1));
+        if let Ok(session) = Session::new(model(), log) {
+            let series = CompareOptions::default().series(true);
+            if let Ok(answer) = session.compare(&series) {
+                prop_assert!(answer.to_json().is_ok());
+            }
+            let _ = session.fit(&FitOptions::default().method(Method::Rls));
+            let _ = session.fit(&FitOptions::default().max_iterations(3));
+        }
+    }
+
+    #[test]
+    fn any_text_is_read_or_refused_with_its_place(text in text(), value in ANY) {
+        let place = |error: loopsight::Error| {
+            assert!(!error.message().is_empty());
+            let _ = (error.to_string(), error.excerpt().map(|(text, span)| text.get(span)));
+        };
+        let _ = Log::from_bytes("any.csv", text.as_bytes()).map_err(place);
+        let _ = Loop::from_toml("loop.toml", &text).map_err(place);
+        let _ = explain(&text).map_err(place);
+        let _ = Experiment::from_toml("experiment.toml", &text).map_err(place);
+        if let Ok(model) = Model::from_toml("model.toml", &text).map_err(place) {
+            let _ = model.with_value("stiffness_per_mass", value).map_err(place);
+            let session = Session::of_model(model);
+            let _ = session.compare(&CompareOptions::default()).map_err(place);
+            let _ = session.add(&AddOptions::new(&text)).map_err(place);
+        }
+    }
+}
+
+#[test]
+fn numbers_that_are_none_are_refused_in_options() {
+    let session = Session::of_model(model());
+    for wrong in [f64::NAN, f64::INFINITY, -1.0, 0.0] {
+        let plan = ExperimentOptions::default().ask(Ask::Pin("nothing".to_owned()));
+        assert!(session.experiment(&plan).is_err());
+        for options in [
+            ExperimentOptions::default().limit(wrong),
+            ExperimentOptions::default().period_s(wrong),
+            ExperimentOptions::default().duration_s(wrong),
+        ] {
+            assert!(session.experiment(&options).is_err(), "{wrong}");
+        }
+        let text = format!("duration_s = {wrong:?}\nperiod_s = 0.01\n").replace("NaN", "nan");
+        if let Ok(experiment) = Experiment::from_toml("e.toml", &text) {
+            assert!(session.simulate(&SimulateOptions::new(experiment)).is_err());
+        }
+    }
+}
