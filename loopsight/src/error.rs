@@ -28,9 +28,9 @@ pub enum ErrorKind {
 /// What went wrong, and where.
 ///
 /// ```
-/// let wrong = loopsight::Model::from_toml("robot.toml", "[plant.ddmr]\nK_Q = 1.0\n").unwrap_err();
+/// let wrong = loopsight::Model::from_toml("robot.toml", "[plant.ddmr]\nhalf_trak = 0.1\n").unwrap_err();
 /// assert_eq!((wrong.file(), wrong.line()), (Some("robot.toml"), Some(2)));
-/// assert_eq!(wrong.help(), Some("did you mean `K_A`?"));
+/// assert_eq!(wrong.help(), Some("did you mean `half_track`?"));
 /// ```
 #[derive(Clone)]
 pub struct Error(Box<Inner>);
