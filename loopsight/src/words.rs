@@ -1,139 +1,110 @@
-//! What the answers say in words.
+//! What the answers say in words: the sentences of [`loopsight_report::words`], on answers.
 
-use loopsight_diagnosis::{Comparison, Conclusion, Diagnosis, Fit, Plan, Promise};
-use loopsight_recordings::{Fault, Severity};
-use loopsight_report::ASTRAY;
+use loopsight_diagnosis::tracking::StepResponse;
+use loopsight_diagnosis::{Comparison, Diagnosis, Fit, Improvement, Plan};
+pub(crate) use loopsight_report::words as report;
+use report::run::{Learned, Regression, RunFigures, Tracked};
+pub(crate) use report::{faults, hundredths as percent, number};
 
-use crate::answers::{RunAnswer, Tracking};
-
-/// Six significant digits, without needless zeros.
-pub(crate) fn number(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let magnitude = value.abs().log10().floor();
-    if !(-4.0..7.0).contains(&magnitude) {
-        return format!("{value:.4e}");
-    }
-    let decimals = (5.0 - magnitude).max(0.0) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    }
-}
-
-/// Per cent with a sensible number of digits.
-pub(crate) fn percent(value: f64) -> String {
-    if value.is_nan() {
-        "-".to_owned()
-    } else if value > ASTRAY {
-        format!("> {:.0} %", 100.0 * ASTRAY)
-    } else {
-        format!("{:.2} %", 100.0 * value)
-    }
-}
-
-/// A line for each fault.
-pub(crate) fn faults(faults: &[Fault]) -> String {
-    let mut text = String::new();
-    for fault in faults {
-        let word = match fault.severity() {
-            Severity::Note => "note",
-            Severity::Warning => "warning",
-            Severity::Fatal => "fault",
-        };
-        text.push_str(&format!("{word}: {fault}\n"));
-    }
-    text
-}
+use crate::answers::{ReferenceStep, RunAnswer, Tracking};
 
 /// How well a model does.
 pub(crate) fn comparison(comparison: &Comparison) -> String {
-    format!(
-        "free run: error {} of the standard deviation, fit {:.2} %",
-        percent(comparison.nrmse),
-        comparison.fit_percent,
-    )
+    report::comparison::summary(comparison).join(" ")
 }
 
 /// What a fit came to.
 pub(crate) fn fit(fit: &Fit) -> String {
-    format!(
-        "error on the fitted log: {}{}",
-        fit.nrmse_before
-            .map_or_else(String::new, |b| format!("{} before, ", percent(b))),
-        percent(fit.nrmse_fit)
-    )
+    report::fit::summary(fit).join(" ")
 }
 
 /// The conclusion of a diagnosis.
 pub(crate) fn diagnosis(diagnosis: &Diagnosis) -> String {
-    let nominal = percent(diagnosis.nominal.nrmse);
-    match (diagnosis.verdict, diagnosis.candidates.first()) {
-        (Conclusion::EffectMissing, Some(best)) => format!(
-            "The model lacks {} at {}: with it the free-run error falls from {nominal} to {} (noise alone: {}).",
-            best.place.effect,
-            best.place.at.join(" and "),
-            percent(best.nrmse),
-            percent(diagnosis.floor.nrmse)
-        ),
-        (Conclusion::UnknownEffect, _) => format!(
-            "Something is missing (error {nominal}, noise alone {}), and nothing in the library is it.",
-            percent(diagnosis.floor.nrmse)
-        ),
-        (Conclusion::LogFaulty, _) => "The log is faulty: nothing was fitted.".to_owned(),
-        (Conclusion::DataInsufficient, _) => {
-            "The recording cannot carry the model: nothing was fitted.".to_owned()
-        }
-        (Conclusion::Cancelled, _) => "The diagnosis was cancelled.".to_owned(),
-        _ => format!(
-            "Nothing is missing: the error of {nominal} is what noise and resolution leave ({}).",
-            percent(diagnosis.floor.nrmse)
-        ),
-    }
+    report::diagnosis::summary(diagnosis).join(" ")
+}
+
+/// The conclusion of an improvement.
+pub(crate) fn improvement(improvement: &Improvement) -> String {
+    report::improvement::summary(improvement).join(" ")
 }
 
 /// What an experiment is and why.
 pub(crate) fn plan(plan: &Plan) -> String {
-    match plan.verdict {
-        Promise::CannotBeSeparated => plan.reason.clone(),
-        _ => format!("run for {} s: {}", plan.duration_s, plan.reason),
-    }
+    report::plan::summary(plan).join(" ")
 }
 
 /// What a run came to.
 pub(crate) fn run(run: &RunAnswer) -> String {
-    format!(
-        "{} ticks in {} s: {}",
-        run.ticks,
-        number(run.duration_s),
-        run.end
-    )
+    report::run::summary(&figures(run)).join(" ")
 }
 
 /// How a signal followed the steps of its reference, where it had any.
 pub(crate) fn reached(tracking: &Tracking) -> Option<String> {
-    let steps = &tracking.steps;
-    let settled: Vec<f64> = steps.iter().filter_map(|s| s.settling_time_s).collect();
-    if steps.is_empty() {
-        return None;
-    }
-    let overshoot: Vec<f64> = steps.iter().map(|s| s.overshoot_percent).collect();
-    Some(format!(
-        "{}: {} of {} steps came to stay within 2 %{}; overshoot {:.1} % (median)",
-        tracking.id,
-        settled.len(),
-        steps.len(),
-        median(settled).map_or_else(String::new, |m| format!(", after {m:.3} s (median)")),
-        median(overshoot).unwrap_or(f64::NAN)
-    ))
+    let response = |step: &ReferenceStep| StepResponse {
+        at_s: step.at_s,
+        from: step.from,
+        to: step.to,
+        settling_time_s: step.settling_time_s,
+        overshoot_percent: step.overshoot_percent,
+    };
+    let steps: Vec<StepResponse> = tracking.steps.iter().map(response).collect();
+    report::run::followed_steps(&tracking.id, &steps)
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+/// The figures of a run that words are made of.
+pub(crate) fn figures(run: &RunAnswer) -> RunFigures<'_> {
+    let tracked = run.tracking.iter().map(|t| Tracked {
+        id: &t.id,
+        unit: &t.unit,
+        rms_error: t.rms_error,
+        largest_error: t.largest_error,
+    });
+    let learned = run.estimates.iter().map(|p| Learned {
+        name: &p.name,
+        unit: &p.unit,
+        start: p.start,
+        value: p.value,
+        interval95: p.interval95,
+    });
+    let regressions = run.innovation.iter().enumerate().map(|(i, innovation)| {
+        let learning = run.learning.get(i);
+        Regression {
+            id: &innovation.id,
+            unit: &innovation.unit,
+            innovation_rms: innovation.rms,
+            excitation_rms: run.excitation.get(i).and_then(|e| e.rms),
+            learned: learning.map_or(f64::NAN, |l| l.taught_share),
+            withheld: learning.map_or_else(Vec::new, |l| {
+                l.withheld_share
+                    .iter()
+                    .map(|(why, share)| (*why, *share))
+                    .collect()
+            }),
+        }
+    });
+    RunFigures {
+        ticks: run.ticks,
+        period_s: run.duration_s / run.ticks.max(1) as f64,
+        end: &run.end,
+        saturated: run.saturated_share,
+        stale: run.stale_share,
+        fallen_back: run.fallen_back_share,
+        timing: run.timing.as_ref().map(|t| loopsight_report::Timing {
+            jitter_s: t.jitter_s,
+            latest_s: t.latest_s,
+            missed: t.missed,
+            longest_s: t.longest_s,
+        }),
+        tracking: tracked.collect(),
+        learned: learned.collect(),
+        regressions: regressions.collect(),
+        events: run
+            .events
+            .iter()
+            .map(|e| (e.time_s, e.what.as_str()))
+            .collect(),
+        notes: &run.notes,
+    }
 }
 
 /// How a robot took what it was told.

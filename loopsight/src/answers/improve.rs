@@ -152,7 +152,7 @@ impl ImproveAnswer {
             faults: last.map_or_else(Vec::new, |d| all(&d.faults)),
             advice: last.map_or_else(Vec::new, |d| all(&d.advice)),
             observer: last.and_then(|d| d.observer.as_ref()).map(Into::into),
-            summary: last.map_or_else(String::new, words::diagnosis),
+            summary: words::improvement(&engine),
             series: None,
             engine: Arc::new(engine),
             model,

@@ -5,6 +5,7 @@ use crate::cli::arguments::CompareArguments;
 use crate::cli::progress::Bar;
 use crate::cli::{files, output};
 use crate::error::Result;
+use crate::words::report;
 
 pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     arguments.html.as_deref().map_or(Ok(()), files::writable)?;
@@ -19,7 +20,7 @@ pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     for note in answer.notes() {
         output::note(note);
     }
-    let text = output::errors(&answer.errors, &answer.summary);
+    let text = report::comparison::text(&answer.engine);
     output::answer(&answer, &text, arguments.json)?;
     if let Some(path) = &arguments.html {
         files::save(path, &answer.page(&output::command_line()))?;

@@ -4,6 +4,7 @@ use crate::cli::arguments::{FitArguments, MethodName, SchemeName};
 use crate::cli::progress::Bar;
 use crate::cli::{files, output};
 use crate::error::Result;
+use crate::words::report;
 use crate::{FitOptions, Method, Scheme};
 
 pub(crate) fn run(arguments: &FitArguments) -> Result<()> {
@@ -26,15 +27,11 @@ pub(crate) fn run(arguments: &FitArguments) -> Result<()> {
     let answer = session.fit(&options);
     drop(bar);
     let answer = answer?;
-    let judged = match &arguments.test {
-        Some(path) => format!("\non {}, which it was not fitted to:\n", path.display()),
-        None => "\n".to_owned(),
-    };
-    let text = format!(
-        "{}\n{judged}{}",
-        output::fit(&answer),
-        output::errors(&answer.errors, &answer.judged())
-    );
+    let test = arguments
+        .test
+        .as_ref()
+        .map(|path| path.display().to_string());
+    let text = report::fit::text(&answer.engine, test.as_deref());
     output::answer(&answer, &text, arguments.json)?;
     if let Some(path) = &arguments.output {
         files::save(path, answer.model().to_toml())?;
