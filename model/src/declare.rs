@@ -25,13 +25,18 @@ macro_rules! declare_plant {
             struct Part($crate::registry::ConfiguredPlant<$plant>);
 
             impl serde::Serialize for Part {
-                fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                fn serialize<S: serde::Serializer>(
+                    &self,
+                    to: S,
+                ) -> ::core::result::Result<S::Ok, S::Error> {
                     serde::Serialize::serialize(&self.0, to)
                 }
             }
 
             impl<'de> serde::Deserialize<'de> for Part {
-                fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                fn deserialize<D: serde::Deserializer<'de>>(
+                    from: D,
+                ) -> ::core::result::Result<Self, D::Error> {
                     serde::Deserialize::deserialize(from).map(Part)
                 }
             }
@@ -82,13 +87,18 @@ macro_rules! declare_effect {
             struct Part($crate::registry::ConfiguredEffect<$effect>);
 
             impl serde::Serialize for Part {
-                fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                fn serialize<S: serde::Serializer>(
+                    &self,
+                    to: S,
+                ) -> ::core::result::Result<S::Ok, S::Error> {
                     serde::Serialize::serialize(&self.0, to)
                 }
             }
 
             impl<'de> serde::Deserialize<'de> for Part {
-                fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                fn deserialize<D: serde::Deserializer<'de>>(
+                    from: D,
+                ) -> ::core::result::Result<Self, D::Error> {
                     serde::Deserialize::deserialize(from).map(Part)
                 }
             }

@@ -2,8 +2,7 @@
 
 use std::io::Write as _;
 
-use crate::answers::{Answer, Correction, Estimates, Failing, LogFault, MissingForce, ModelErrors};
-use crate::answers::{FitAnswer, ParameterEstimate, ParameterVerdict, Severity};
+use crate::answers::Answer;
 use crate::error::Result;
 pub(crate) use crate::words::report::{columns, table};
 
