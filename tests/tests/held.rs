@@ -8,11 +8,11 @@
 )]
 
 use assert_cmd::Command;
-use loopsight_diagnosis::{Fit, fit};
 use loopsight_diagnosis::{
     Because, Conclusion, ExperimentLimits, FitSettings, Measurements, Question, QuestionError,
     Work, compare, diagnose, experiment,
 };
+use loopsight_diagnosis::{Fit, fit};
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_tests::balance::{axis, cart_pole, servo, upright};

@@ -23,7 +23,9 @@ pub fn measured(seconds: f64) -> Result<Log> {
     let steps = (seconds / STEP) as usize;
     for k in 0..steps {
         if k % 5000 == 0 {
-            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             applied = ((random >> 33) % 7) as f64 - 3.0;
         }
         if k % 100 == 0 {

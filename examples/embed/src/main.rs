@@ -8,7 +8,12 @@ use loopsight::{CancelToken, Result};
 
 fn main() -> Result<()> {
     let answer = diagnose(measured(25.0)?, &CancelToken::new(), |progress| {
-        println!("{}: {} of {}", progress.stage.text(), progress.done, progress.total);
+        println!(
+            "{}: {} of {}",
+            progress.stage.text(),
+            progress.done,
+            progress.total
+        );
     })?;
     println!("{}", answer.summary);
 
@@ -23,7 +28,11 @@ fn main() -> Result<()> {
     let ended = Instant::now();
     if let Ok(pressed) = pressed.join() {
         let late = ended.saturating_duration_since(pressed);
-        println!("stopped: {}, after {:.0} ms", was_stopped(&answer), 1e3 * late.as_secs_f64());
+        println!(
+            "stopped: {}, after {:.0} ms",
+            was_stopped(&answer),
+            1e3 * late.as_secs_f64()
+        );
     }
     Ok(())
 }
