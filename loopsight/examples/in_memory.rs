@@ -9,7 +9,11 @@ fn main() -> Result<()> {
     let (mut time, mut force, mut position) = (Vec::new(), Vec::new(), Vec::new());
     for k in 0..100_000 {
         let t = f64::from(k) * step;
-        let f = if (t / 1.3) as u32 % 2 == 0 { 5.0 } else { -5.0 };
+        let f = if ((t / 1.3) as u32).is_multiple_of(2) {
+            5.0
+        } else {
+            -5.0
+        };
         if k % 100 == 0 {
             time.push(t);
             force.push(f);

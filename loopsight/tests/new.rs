@@ -197,8 +197,8 @@ fn a_crate_has_all_its_files_and_knows_where_loopsight_is() {
     let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap();
     let manifest: toml::Table = manifest.parse().unwrap();
     assert_eq!(manifest["package"]["name"].as_str(), Some("my-crate"));
-    for room in ["core", "cli"] {
-        let path = &manifest["dependencies"][format!("loopsight-{room}")]["path"];
+    for package in ["loopsight-core", "loopsight-model", "loopsight"] {
+        let path = &manifest["dependencies"][package]["path"];
         let path = Path::new(path.as_str().unwrap());
         assert!(path.join("Cargo.toml").is_file(), "{}", path.display());
     }

@@ -323,7 +323,15 @@ fn the_same_request_gives_the_same_log() {
 fn json_has_the_keys_that_were_promised() {
     let desk = Desk::new();
     desk.done(&["simulate", "model.toml", "experiment.toml", "-o", "log.csv"]);
-    let compare = ["faults", "fit_percent", "nrmse", "signals"];
+    let compare = [
+        "faults",
+        "fit_percent",
+        "nrmse",
+        "schema",
+        "signals",
+        "summary",
+        "where_it_fails",
+    ];
     let said = desk.json(&["compare", "model.toml", "log.csv", "--json"]);
     assert_eq!(keys(&said), BTreeSet::from(compare));
     let signal = [
