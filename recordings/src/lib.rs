@@ -11,7 +11,7 @@
 //! let inputs = [Signal::new("voltage", "u", "V", "Voltage of the motor.")];
 //! let outputs = [Signal::new("speed", "w", "rad/s", "Speed of the shaft.")];
 //! let log = map(&Source::Table(table), &inputs, &outputs, &LogMap::default()).unwrap();
-//! assert_eq!(log.runs[0].time, [0.0, 0.5, 1.0, 1.5]);
+//! assert_eq!(log.runs[0].time(), [0.0, 0.5, 1.0, 1.5]);
 //! assert!((log.runs[0].sample(2)[0] - std::f64::consts::TAU).abs() < 1e-12); // 60 rpm
 //! ```
 //!

@@ -12,8 +12,12 @@ pub mod json_schema;
 pub mod loops;
 
 use std::collections::BTreeMap;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use flate2::read::GzDecoder;
 use loopsight_controllers as _;
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_estimators as _;
@@ -136,4 +140,22 @@ impl Random {
     pub fn below(&mut self, end: usize) -> usize {
         ((self.bits() >> 33) as usize) % end
     }
+}
+
+/// A page with the charts' data as they were before they were packed; the charts' library is left as it is.
+///
+/// # Panics
+///
+/// Where a chart's data are not gzip in base64.
+pub fn opened(page: &str) -> String {
+    const OPENING: &str = "<script type=\"application/gzip\">";
+    let mut parts = page.split(OPENING);
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (packed, rest) = part.split_once("</script>").unwrap();
+        let bytes = STANDARD.decode(packed).unwrap();
+        GzDecoder::new(&bytes[..]).read_to_string(&mut out).unwrap();
+        out += rest;
+    }
+    out
 }

@@ -353,6 +353,7 @@ fn json_has_the_keys_that_were_promised() {
         "nrmse_fit",
         "iterations",
         "flat",
+        "cancelled",
     ];
     assert_eq!(keys(&said), compare.into_iter().chain(more).collect());
     let parameters = &said["parameters"];

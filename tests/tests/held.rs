@@ -144,7 +144,7 @@ fn friction_of_the_cart_is_named_from_a_pole_held_upright() {
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(0), "{text}");
     assert!(text.contains("The model lacks coulomb_friction at cart"));
-    assert!(text.contains("note: the model is unstable"), "{text}");
+    assert!(text.contains("Note: the model is unstable"), "{text}");
     let told: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(told["missing"]["at"], serde_json::json!(["cart"]));
     assert_eq!(told["observer"]["because"], "unstable");
