@@ -99,15 +99,11 @@ pub fn compare(
     work: &Work<'_>,
 ) -> Result<Comparison, CompareError> {
     let Measurements { runs, faults, .. } = *measurements;
-    let missing = model.missing_values();
-    if !missing.is_empty() {
-        return Err(CompareError::MissingValues(
-            missing.iter().map(|m| (*m).to_owned()).collect(),
-        ));
-    }
+    with_values(model)?;
     if model.measured.is_empty() {
         return Err(CompareError::NothingMeasured);
     }
+    measurements.check(model)?;
     if runs.iter().all(Run::is_empty) {
         return Err(CompareError::NoSamples);
     }
@@ -138,6 +134,16 @@ pub fn compare(
         where_it_fails: where_it_fails(model, &solution, &runs, work)?,
         runs: traces,
     })
+}
+
+/// Whether every parameter has a value.
+pub(crate) fn with_values(model: &Model) -> Result<(), CompareError> {
+    let missing = model.missing_values();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let names = missing.iter().map(|name| (*name).to_owned());
+    Err(CompareError::MissingValues(names.collect()))
 }
 
 fn trace(

@@ -50,6 +50,7 @@ pub(crate) fn diagnose_above(
     least: f64,
     work: &Work<'_>,
 ) -> Result<Diagnosis, FitError> {
+    measurements.check(model)?;
     // Cancelled until it is done: each step adds what it finds.
     let mut diagnosis = Diagnosis::begun(measurements.faults);
     if refused(&mut diagnosis, model, measurements, work.criteria()) {

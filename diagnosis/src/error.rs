@@ -13,6 +13,18 @@ pub enum CompareError {
     /// Nothing is measured.
     #[error("the model's log has no measured signal")]
     NothingMeasured,
+    /// The runs are not those of this model.
+    #[error(
+        "the runs have {found} {what}, and the model has {expected}: they are not of one machine"
+    )]
+    OtherMachine {
+        /// Inputs, or measured signals.
+        what: &'static str,
+        /// How many the runs have.
+        found: usize,
+        /// How many the model has.
+        expected: usize,
+    },
     /// There is no sample.
     #[error("the recording has no sample")]
     NoSamples,

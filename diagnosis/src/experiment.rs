@@ -155,6 +155,7 @@ impl<'m> Design<'m> {
 
     /// A length within what an experiment may take, s.
     fn allowed(&self, length: f64, longest: f64) -> f64 {
+        let longest = longest.min(question::MOST_SAMPLES * self.limits.period);
         length.max(self.criteria().shortest_s).min(longest).ceil()
     }
 

@@ -27,6 +27,7 @@ pub fn fit(
 ) -> Result<Fit, FitError> {
     let runs = measurements.runs;
     check(model, runs)?;
+    measurements.check(model)?;
     let fitted_to = Measurements {
         test: None,
         ..*measurements

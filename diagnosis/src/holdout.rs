@@ -42,7 +42,10 @@ impl<'a> Holdout<'a> {
                     run.time()
                         .iter()
                         .map(|t| {
-                            t < &block || !((t / block) as usize + index).is_multiple_of(every)
+                            t < &block
+                                || !((t / block) as usize)
+                                    .wrapping_add(index)
+                                    .is_multiple_of(every)
                         })
                         .collect()
                 })

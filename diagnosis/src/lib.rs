@@ -1,5 +1,69 @@
-//! Hold a model against measurements: free run and one-step prediction ([`compare`](compare())),
-//! recursive and output-error fits ([`fit`]) with intervals that mean what they say.
+//! Compare a model with measurements, fit it, find which physical effect is missing, and say what to record
+//! next.
+//!
+//! # Workflow
+//!
+//! 1. [`compare`](compare()): how far is the model from the measurements? The *free run* is simulated from the
+//!    inputs alone, the *one-step prediction* from the measured state. [`Comparison::where_it_fails`] says
+//!    under which conditions the error is large.
+//! 2. [`fit`](fit()): which parameters make the free run agree best, and how well do the data determine each?
+//!    Intervals hold for coloured noise; what is not determined is named.
+//! 3. [`diagnose`](diagnose()): which effect of the library is missing? Each is added at every place it fits, all
+//!    parameters are fitted again, and it is judged on data that no fit has seen. Effects that the data cannot
+//!    tell apart are named together.
+//! 4. [`improve`](improve()): add the missing effect and begin again, until nothing more is missing.
+//! 5. [`experiment`](experiment()): which inputs tell two effects apart, or determine a parameter?
+//! 6. [`residual_force`](residual_force()): where no effect of the library fits, what does the missing force
+//!    depend on?
+//!
+//! ```
+//! use loopsight_diagnosis::{Conclusion, Measurements, Work, compare, diagnose};
+//! use loopsight_model::model::Model;
+//! use loopsight_model::run::{Rows, Run};
+//! use loopsight_model::simulate::Simulator;
+//! use loopsight_plants as _; // the library of plants and effects
+//!
+//! // A motor with dry friction, measured every 10 ms while its voltage jumps between some levels.
+//! let axis = "[plant.dc_axis]\nK_A = -2.0\nK_C = 8.0\n\n[log.measured.speed]\n";
+//! let friction = "\n[[effect]]\n[effect.coulomb_friction]\nat = [\"shaft\"]\nlevel = 0.8\n";
+//! let (machine, _) = Model::from_toml("machine.toml", &format!("{axis}{friction}"))?;
+//! let mut simulator = Simulator::new(&machine, &machine.values());
+//! let (mut time, mut voltage, mut speed) = (Vec::new(), Vec::new(), Vec::new());
+//! for k in 0..1500_u32 {
+//!     let level = [3.0, -2.0, 1.5, -4.0, 0.5, -1.0][(k / 50) as usize % 6];
+//!     time.push(0.01 * f64::from(k));
+//!     voltage.push(level);
+//!     // The sensor rounds to a hundredth.
+//!     speed.push((100.0 * simulator.state()[0]).round() / 100.0);
+//!     simulator.advance(0.01 * f64::from(k + 1), &[level]);
+//! }
+//! let runs = [Run::new("", time, Rows::new(1, voltage), Rows::new(1, speed))?];
+//!
+//! // What does the plain model lack?
+//! let (model, _) = Model::from_toml("axis.toml", axis)?;
+//! let measurements = Measurements::new(&runs);
+//! let before = compare(&model, &measurements, &Work::quiet())?;
+//! let diagnosis = diagnose(&model, &measurements, &Work::quiet())?;
+//! assert_eq!(diagnosis.verdict, Conclusion::EffectMissing);
+//! let found = &diagnosis.candidates[0];
+//! assert_eq!(found.place.effect, "coulomb_friction");
+//! assert!((found.parameters["level"].value - 0.8).abs() < 0.05);
+//! assert!(found.nrmse < 0.1 * before.nrmse);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Long work
+//!
+//! A diagnosis takes seconds to minutes. [`Work`] tells how far it is ([`Progress`]) and stops it
+//! ([`CancelToken`]); work that is cancelled keeps what it has found. [`Work::decided_by`] gives other
+//! [`Criteria`] than the default ones: every threshold that decides a verdict is there, with its unit and its
+//! reason.
+//!
+//! # Features
+//!
+//! None: the crate needs `std`, and builds for `wasm32-unknown-unknown` as well. The effects that are tried are
+//! those linked into the program: the library is `loopsight-plants`, and effects declared elsewhere or written
+//! as expressions in the model file count as well.
 
 mod advice;
 mod candidates;

@@ -1,7 +1,10 @@
 //! What a model is compared with, fitted to and judged on.
 
+use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_recordings::Fault;
+
+use crate::error::CompareError;
 
 /// Measured runs: those to fit to, those to judge on, and what is wrong with the log.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,6 +39,28 @@ impl<'a> Measurements<'a> {
     pub fn with_faults(mut self, faults: &'a [Fault]) -> Self {
         self.faults = faults;
         self
+    }
+
+    /// Whether all runs have the inputs and the measured signals of `model`.
+    pub(crate) fn check(&self, model: &Model) -> Result<(), CompareError> {
+        let expected = [
+            ("inputs", model.plant.inputs.len()),
+            ("measured signals", model.measured.len()),
+        ];
+        let runs = self.runs.iter().chain(self.test.unwrap_or_default());
+        for run in runs.filter(|run| !run.is_empty()) {
+            let found = [run.n_inputs(), run.n_measured()];
+            for ((what, expected), found) in expected.into_iter().zip(found) {
+                if found != expected {
+                    return Err(CompareError::OtherMachine {
+                        what,
+                        found,
+                        expected,
+                    });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The runs that judge where there are any, else those to fit to.

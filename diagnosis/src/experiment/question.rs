@@ -196,7 +196,7 @@ pub(super) fn parameter(model: &Model, name: &str) -> Result<usize, QuestionErro
 }
 
 /// Most samples of an experiment.
-const MOST_SAMPLES: f64 = 1e6;
+pub(super) const MOST_SAMPLES: f64 = 1e6;
 
 pub(super) fn check(model: &Model, limits: &ExperimentLimits) -> Result<(), QuestionError> {
     let missing = model.missing_values();

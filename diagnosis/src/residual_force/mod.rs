@@ -17,6 +17,9 @@ use serde::Serialize;
 
 pub use dependence::{ForceBin, ForceCurve, ForceDependence};
 
+use crate::compare::with_values;
+use crate::error::CompareError;
+use crate::measurements::Measurements;
 use crate::prediction::{InitialStates, Solution};
 use crate::progress::{Cancelled, Work};
 use blocks::Blocks;
@@ -72,15 +75,23 @@ pub struct ForceExpression {
 ///
 /// # Errors
 ///
-/// [`Cancelled`] when the work was cancelled.
+/// [`CompareError`] when the model has no values, when the runs are not its own, and when the work was
+/// cancelled.
 pub fn residual_force(
     model: &Model,
     runs: &[Run],
     work: &Work<'_>,
-) -> Result<Option<ResidualForce>, Cancelled> {
+) -> Result<Option<ResidualForce>, CompareError> {
+    with_values(model)?;
+    Measurements::new(runs).check(model)?;
     let values = model.values();
     let states = InitialStates::estimate(model, &values, runs, work)?.states;
-    of_solution(model, &Solution { values, states }, runs, work)
+    Ok(of_solution(
+        model,
+        &Solution { values, states },
+        runs,
+        work,
+    )?)
 }
 
 /// As [`residual_force`], from known initial states.
