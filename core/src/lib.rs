@@ -7,7 +7,7 @@
 //!
 //! | what | types |
 //! |---|---|
-//! | quantities with units, declared once as constants | [`Signal`], [`Parameter`], [`Derived`], [`unit`] |
+//! | quantities with units, declared once as constants | [`Signal`], [`Parameter`], [`Derived`], [`unit`](mod@unit) |
 //! | where physics acts on a plant, and what can be read there | [`Channel`], [`Place`], [`Role`] |
 //! | equations of motion, and physics that is added to them | [`Plant`], [`Effect`] |
 //! | parts of a loop | [`Estimator`], [`Controller`], [`AffineModel`], [`Driver`], [`Clock`] |

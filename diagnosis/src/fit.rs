@@ -13,7 +13,7 @@ use crate::{output_error, rls};
 
 /// Fits the free parameters of `model` to the runs; the comparison is on the test runs where given.
 ///
-/// A fit that is cancelled returns the best values it has found ([`Fit::cancelled`]).
+/// A fit that is cancelled returns the best values it has found (`Fit::cancelled`).
 ///
 /// # Errors
 ///

@@ -19,7 +19,7 @@ pub struct ImprovementStep {
     pub nrmse_test: f64,
 }
 
-/// The result of [`improve`].
+/// The result of [`improve`](crate::improve()).
 #[derive(Debug, Serialize)]
 pub struct Improvement {
     /// The model as it was, then each addition.
