@@ -12,13 +12,15 @@
 
 use std::fmt::Write as _;
 
-use loopsight_diagnosis::{
-    Conclusion, Diagnosis, EffectAt, Explanation, Measurements, Work, diagnose,
-};
-use loopsight_hidden::{Experiment, Hidden, Robot, catalogue, record_with, refit};
-use loopsight_model::model::Model;
+use loopsight_diagnosis::Criteria;
+use loopsight_hidden::{Experiment, Robot, catalogue};
 use loopsight_plants as _;
 use rayon::prelude::*;
+
+#[path = "blind/mod.rs"]
+mod blind;
+
+use blind::{Case, Recorded};
 
 /// Windings of a motor with an ironless rotor, s.
 const WINDINGS: &str = "1e-4";
@@ -44,9 +46,6 @@ time constant of 0.1 ms that no model knows of: it is too little to be seen, but
 their own, and friction under pseudo-random voltages that reverse at once. `--windings 1e-6` is without.
 
 ";
-
-/// A refit of the plain model leaves less than this multiple of the floor: nothing shows.
-const INVISIBLE: f64 = 1.15;
 
 /// An error of ten times the signal's own deviation: a model that runs away.
 const ASTRAY: f64 = 10.0;
@@ -109,7 +108,7 @@ fn main() {
     let only = value("--only", "");
     let windings: f64 = value("--windings", WINDINGS).parse().unwrap_or(1e-4);
 
-    let mut jobs: Vec<(Robot, Option<Hidden>, Experiment, f64, u64)> = Vec::new();
+    let mut jobs: Vec<Case> = Vec::new();
     for (robot, effect) in catalogue() {
         let case = robot.case(Some(effect));
         let meant = |name: &str| name == case || name == effect.id() || name == robot.name();
@@ -119,7 +118,13 @@ fn main() {
         for experiment in &experiments {
             for size in &sizes {
                 for seed in first..first + seeds {
-                    jobs.push((robot, Some(effect), *experiment, *size, seed));
+                    jobs.push(Case {
+                        robot,
+                        effect: Some(effect),
+                        experiment: *experiment,
+                        size: *size,
+                        seed,
+                    });
                 }
             }
         }
@@ -127,13 +132,19 @@ fn main() {
     if only.is_empty() {
         for seed in 0..clean {
             let experiment = experiments[seed as usize % experiments.len()];
-            jobs.push((Robot::Twil, None, experiment, 0.0, 100 * first + seed));
+            jobs.push(Case {
+                robot: Robot::Twil,
+                effect: None,
+                experiment,
+                size: 0.0,
+                seed: 100 * first + seed,
+            });
         }
     }
     let rows: Vec<Row> = jobs
         .par_iter()
-        .filter_map(|(robot, effect, experiment, size, seed)| {
-            let row = try_one(*robot, *effect, *experiment, *size, *seed, windings)?;
+        .filter_map(|case| {
+            let row = try_one(*case, windings)?;
             eprintln!(
                 "{} {:30} {:6} size {:3} seed {:3}: {:60} {:6.2} -> {:6.2} floor {:5.2} {}",
                 if row.right { "ok   " } else { "WRONG" },
@@ -165,50 +176,26 @@ fn main() {
     }
 }
 
-fn try_one(
-    robot: Robot,
-    effect: Option<Hidden>,
-    experiment: Experiment,
-    size: f64,
-    seed: u64,
-    windings: f64,
-) -> Option<Row> {
-    let hidden: Vec<(Hidden, f64)> = effect.map(|e| (e, size)).into_iter().collect();
-    let log = record_with(robot, &hidden, experiment, seed, windings).ok()?;
-    let test = record_with(
+fn try_one(case: Case, windings: f64) -> Option<Row> {
+    let recorded = case.record(windings)?;
+    let diagnosis = recorded.diagnose(&Criteria::DEFAULT)?;
+    let right = recorded.right(&diagnosis);
+    let Recorded {
+        case,
+        log,
+        test,
+        hidden_well,
+        ..
+    } = recorded;
+    let Case {
         robot,
-        &hidden,
-        Experiment::MultiLevel,
-        1000 + seed,
-        windings,
-    )
-    .ok()?;
-    let (model, _) = Model::from_toml("hidden", &log.model_toml).ok()?;
-    let runs = [log.run.clone()];
-    let tests = [test.run.clone()];
-    let diagnosis = diagnose(
-        &model,
-        &Measurements::new(&runs).tested_on(Some(&tests)),
-        &Work::quiet(),
-    )
-    .ok()?;
-    let hidden_well = effect.is_some() && refit(&log).left(&log) < INVISIBLE * log.floor();
+        effect,
+        experiment,
+        size,
+        seed,
+    } = case;
     let what = effect.map_or_else(|| "clean".to_owned(), |e| robot.case(Some(e)));
     let truth = log.truth.hidden.first();
-    let right = match truth {
-        None => diagnosis.verdict == Conclusion::NothingMissing,
-        // Where the log cannot show the effect at all, the right answer is to say so.
-        Some(_) if hidden_well && diagnosis.missing.is_none() => matches!(
-            diagnosis.verdict,
-            Conclusion::DataInsufficient | Conclusion::NothingMissing
-        ),
-        // Or that it can be told from nothing that explains the log as well.
-        Some(truth) if diagnosis.verdict == Conclusion::DataInsufficient => {
-            let best = diagnosis.candidates.first();
-            best.is_some_and(|best| among(&best.place, best, truth.effect.id(), &truth.at))
-        }
-        Some(truth) => named(&diagnosis, truth.effect.id(), &truth.at),
-    };
     let best = diagnosis.candidates.first();
     let found = match (&diagnosis.missing, best) {
         (Some(place), Some(best)) => format!(
@@ -267,28 +254,6 @@ fn try_one(
         },
         floor: test.floor(),
         estimates,
-    })
-}
-
-/// Whether the missing effect, or one that the diagnosis says it cannot tell from it, is the true
-/// one at the true channels.
-fn named(diagnosis: &Diagnosis, id: &str, at: &[&str]) -> bool {
-    let (Some(missing), Some(best)) = (&diagnosis.missing, diagnosis.candidates.first()) else {
-        return false;
-    };
-    among(missing, best, id, at)
-}
-
-/// Whether the effect is `first`, or in the class that `best` leads.
-fn among(first: &EffectAt, best: &Explanation, id: &str, at: &[&str]) -> bool {
-    let mut class = vec![first];
-    class.extend(&best.indistinguishable_from);
-    // On an axis an effort at the load is one at the shaft times a constant.
-    let one = |c: &str| if c == "load" { "shaft" } else { c }.to_owned();
-    class.iter().any(|p| {
-        p.effect == id
-            && p.at.len() == at.len()
-            && at.iter().all(|c| p.at.iter().any(|x| one(x) == one(c)))
     })
 }
 

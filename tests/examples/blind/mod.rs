@@ -1,0 +1,103 @@
+//! One blind recording: made, diagnosed, and whether the diagnosis is right.
+
+use loopsight_diagnosis::{
+    Conclusion, Criteria, Diagnosis, EffectAt, Explanation, Measurements, Work, diagnose,
+};
+use loopsight_hidden::{Experiment, Hidden, Recording, Robot, record_with, refit};
+use loopsight_model::model::Model;
+
+/// A refit of the plain model leaves less than this multiple of the floor: nothing shows.
+const INVISIBLE: f64 = 1.15;
+
+/// What is recorded.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Case {
+    /// The machine.
+    pub(crate) robot: Robot,
+    /// What it hides; nothing in a clean recording.
+    pub(crate) effect: Option<Hidden>,
+    /// What it is driven with.
+    pub(crate) experiment: Experiment,
+    /// Size of the effect, in noticeable ones.
+    pub(crate) size: f64,
+    /// Of the experiment and the noise.
+    pub(crate) seed: u64,
+}
+
+/// The log, and the multi-level recording that judges.
+pub(crate) struct Recorded {
+    pub(crate) case: Case,
+    pub(crate) log: Recording,
+    pub(crate) test: Recording,
+    /// A refit of the plain model leaves what cannot be told from the floor: nothing to be found.
+    pub(crate) hidden_well: bool,
+}
+
+impl Case {
+    /// Makes both recordings of a machine whose windings have this time constant (s); none where the
+    /// machine cannot be driven so.
+    pub(crate) fn record(self, windings: f64) -> Option<Recorded> {
+        let hidden: Vec<(Hidden, f64)> = self.effect.map(|e| (e, self.size)).into_iter().collect();
+        let of =
+            |experiment, seed| record_with(self.robot, &hidden, experiment, seed, windings).ok();
+        let log = of(self.experiment, self.seed)?;
+        let test = of(Experiment::MultiLevel, 1000 + self.seed)?;
+        let invisible = || refit(&log).left(&log) < INVISIBLE * log.floor();
+        Some(Recorded {
+            case: self,
+            hidden_well: self.effect.is_some() && invisible(),
+            log,
+            test,
+        })
+    }
+}
+
+impl Recorded {
+    /// What a diagnosis by these criteria says.
+    pub(crate) fn diagnose(&self, criteria: &Criteria) -> Option<Diagnosis> {
+        let (model, _) = Model::from_toml("hidden", &self.log.model_toml).ok()?;
+        let (runs, tests) = ([self.log.run.clone()], [self.test.run.clone()]);
+        let measurements = Measurements::new(&runs).tested_on(Some(&tests));
+        diagnose(&model, &measurements, &Work::quiet().decided_by(criteria)).ok()
+    }
+
+    /// Whether a diagnosis is right.
+    pub(crate) fn right(&self, diagnosis: &Diagnosis) -> bool {
+        match self.log.truth.hidden.first() {
+            None => diagnosis.verdict == Conclusion::NothingMissing,
+            // Where the log cannot show the effect at all, the right answer is to say so.
+            Some(_) if self.hidden_well && diagnosis.missing.is_none() => matches!(
+                diagnosis.verdict,
+                Conclusion::DataInsufficient | Conclusion::NothingMissing
+            ),
+            // Or that it can be told from nothing that explains the log as well.
+            Some(truth) if diagnosis.verdict == Conclusion::DataInsufficient => {
+                let best = diagnosis.candidates.first();
+                best.is_some_and(|best| among(&best.place, best, truth.effect.id(), &truth.at))
+            }
+            Some(truth) => named(diagnosis, truth.effect.id(), &truth.at),
+        }
+    }
+}
+
+/// Whether the missing effect, or one that the diagnosis says it cannot tell from it, is the true
+/// one at the true channels.
+fn named(diagnosis: &Diagnosis, id: &str, at: &[&str]) -> bool {
+    let (Some(missing), Some(best)) = (&diagnosis.missing, diagnosis.candidates.first()) else {
+        return false;
+    };
+    among(missing, best, id, at)
+}
+
+/// Whether the effect is `first`, or in the class that `best` leads.
+fn among(first: &EffectAt, best: &Explanation, id: &str, at: &[&str]) -> bool {
+    let mut class = vec![first];
+    class.extend(&best.indistinguishable_from);
+    // On an axis an effort at the load is one at the shaft times a constant.
+    let one = |c: &str| if c == "load" { "shaft" } else { c }.to_owned();
+    class.iter().any(|p| {
+        p.effect == id
+            && p.at.len() == at.len()
+            && at.iter().all(|c| p.at.iter().any(|x| one(x) == one(c)))
+    })
+}
