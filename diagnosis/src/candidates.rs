@@ -15,15 +15,15 @@ pub(crate) struct Candidate {
     pub(crate) at: Vec<&'static str>,
     /// Each channel has parameters of its own; else they share them.
     pub(crate) separate: bool,
-    /// What it takes the place of, since it contains it: the id, and the parameters of the nominal
-    /// model that are gone.
+    /// The effect of the nominal model that it replaces, because it contains it: its id, and the indices of
+    /// the parameters that are gone.
     pub(crate) replaces: Option<(&'static str, std::ops::Range<usize>)>,
     /// The model with it, at neutral parameters.
     pub(crate) model: Model,
     /// Root mean square of the flow at its channels in the recording; 0 where there is none.
     pub(crate) flow: f64,
-    /// It reads a position, and free runs are not held to the measurements: it can be tried at the
-    /// positions as they were measured.
+    /// It reads a position, and no observer corrects the free runs: it can be tried at the measured
+    /// positions.
     pub(crate) by_position: bool,
     /// Widths over which signs of all effects are smoothed at first, by index of the parameter.
     pub(crate) widths: Vec<(usize, f64)>,
@@ -62,8 +62,8 @@ impl Candidate {
             .count()
     }
 
-    /// Its own parameters on which the effect does not depend linearly, where it reads a position and
-    /// depends on others linearly: with the positions as measured, those are a regression's.
+    /// Its own parameters that do not enter linearly, where the effect reads a position and others do enter
+    /// linearly: at the measured positions a regression finds those others.
     pub(crate) fn shape(&self) -> Option<Vec<usize>> {
         let linear = |i: &usize| self.model.parameters[*i].declaration.linear;
         let regressed = self.by_position && self.own().any(|i| linear(&i));
@@ -83,8 +83,8 @@ impl Candidate {
         self.own().filter(is_width).collect()
     }
 
-    /// Whether, with these `values`, one of its speeds drowns in the width over which its sign is
-    /// smoothed: what is left of it then sharpens the sign, and is no effect of its own.
+    /// Whether, at these `values`, one of its speeds is no larger than the width over which its sign is
+    /// smoothed. Such an effect does no more than sharpen the sign.
     pub(crate) fn drowns(&self, values: &[f64], criteria: &SearchCriteria) -> bool {
         let speeds = |width: bool| {
             self.own().filter_map(move |i| {
@@ -98,8 +98,8 @@ impl Candidate {
         speeds(false).any(|speed| speed < criteria.clear_of_sign * width)
     }
 
-    /// Its model with every sign, also of the effects that were there before, smoothed so widely that
-    /// a fit finds its way: what sticks sharply answers to nothing, and then to everything.
+    /// Its model with every sign smoothed widely, also those of the effects that were there before. A sharp
+    /// sign has no derivative but at zero, where it has a huge one, and a fit cannot find its way.
     pub(crate) fn softened(&self) -> Model {
         let mut model = self.model.clone();
         for (index, width) in &self.widths {
@@ -123,17 +123,18 @@ impl Candidate {
 }
 
 /// All candidates for `model`: each effect at every single channel it fits, and at all channels of a
-/// family (both wheels, all inputs), alike and each with its own parameters. What the model already
-/// has at the same channels, and what acts on a signal that is not measured, is left out; what
-/// contains an effect that the model has there takes its place.
+/// family (both wheels, all inputs), alike and each with its own parameters.
 ///
-/// `rms` holds the root mean squares of the plant's signals in the recording: smoothing widths are
-/// set from it, since what suits a robot's wheels does not suit a flywheel. `held` says that an observer
-/// holds the free runs to the measurements.
+/// Left out are effects that the model has at these channels already, and those that act on a signal which is
+/// not measured. An effect that contains one of the model's at the same channels replaces it.
+///
+/// `rms` are the root mean squares of the plant's signals in the recording. Smoothing widths are set from them:
+/// what suits a robot's wheels does not suit a flywheel. `observed` says that an observer corrects the free
+/// runs.
 pub(crate) fn candidates(
     model: &Model,
     rms: &[f64],
-    held: bool,
+    observed: bool,
     criteria: &SearchCriteria,
 ) -> Vec<Candidate> {
     let sign_width = criteria.sign_width;
@@ -181,7 +182,7 @@ pub(crate) fn candidates(
                         at: at.clone(),
                         separate: *separate,
                         replaces: replaces.clone(),
-                        by_position: !held && Positions::matter_to(meta),
+                        by_position: !observed && Positions::matter_to(meta),
                         widths: widths(&model, rms, sign_width),
                         model,
                         flow,
@@ -193,8 +194,8 @@ pub(crate) fn candidates(
     found
 }
 
-/// Gives the last effect of `model` the widths that suit the recording, `sign_width` times the flow; returns the root mean
-/// square of the flow at its channels.
+/// Gives the last effect of `model` the width that suits the recording, `sign_width` times the flow. Returns the
+/// root mean square of the flow at its channels.
 pub(crate) fn suit(model: &mut Model, rms: &[f64], sign_width: f64) -> f64 {
     let flow = model.effects.last().map_or(0.0, |e| flow(model, e, rms));
     smooth(model, 1, sign_width * flow);
@@ -286,7 +287,7 @@ fn is_seen(model: &Model, meta: &EffectMeta, channel: &Channel) -> bool {
     };
     model.measured.iter().any(|m| {
         m.index == index
-            // Behind counts an encoder's past is not known, only its present.
+            // Of an encoder's angle the model knows the present value, and not the past.
             || !meta.memory && matches!(&m.sensor, Sensor::EncoderCounts(encoder)
                 if encoder.of.keys().any(|s| model.find_signal(s) == Ok(index)))
     })

@@ -11,9 +11,9 @@ pub(crate) struct Chosen {
     pub(crate) finalist: usize,
 }
 
-/// Puts the smallest explanation that is not significantly worse than the best one first, with
-/// those that cannot be told from it. One that has not `earned` its place on unseen data comes first
-/// only where none has.
+/// Puts the simplest explanation first that is not significantly worse than the best one, and lists those that
+/// cannot be told from it. An explanation that has not `earned` its place on unseen data comes first only
+/// where none has earned it.
 pub(crate) fn choose(
     explanations: &mut Vec<Explanation>,
     finalists: &[Judged],
@@ -30,10 +30,10 @@ pub(crate) fn choose(
     finalists.first()?;
     let squared = |i: usize| nrmse(&finalists[i].rank).powi(2);
     let least = squared(0);
-    // While the best explanation itself leaves much unexplained, small differences between
-    // explanations are those of what else is missing.
+    // While the best explanation leaves much unexplained, something else is missing, and small differences
+    // between explanations may be due to that.
     let allowed = least + blur * (least - floor * floor).max(0.0);
-    // No worse than another, by statistics or for all that can be done with it.
+    // No worse than another one: statistically, or by so little that it makes no difference in use.
     let same = |i: usize, other: usize| {
         let (rank, other) = (&finalists[i].rank, &finalists[other].rank);
         let (error, least) = (nrmse(rank), nrmse(other));
@@ -55,9 +55,9 @@ pub(crate) fn choose(
     let leader = firsts()
         .filter(|i| complexity(*i) == simplest)
         .min_by(|a, b| error(*a).total_cmp(&error(*b)))?;
-    // The common before the rare, and both wheels alike before one wheel: what is built alike fails
-    // alike. But only where the errors do not tell them apart, those of the leader: how far the best is
-    // ahead of all of them says nothing of that.
+    // A common effect comes before a rare one, and both wheels alike before one wheel: what is built alike
+    // fails alike. This holds among those whose errors are the same as the leader's; how far the best
+    // explanation is ahead of all of them does not matter here.
     let alike = (0..finalists.len()).filter(may);
     let chosen = alike
         .filter(|i| complexity(*i) == simplest && same(*i, leader))
@@ -67,7 +67,7 @@ pub(crate) fn choose(
             let key = |i: usize| (rarity(i), channels(i));
             key(*a).cmp(&key(*b)).then(error(*a).total_cmp(&error(*b)))
         })?;
-    // And another effect that does as well as the chosen one on what no fit saw.
+    // Another effect that does as well as the chosen one on unseen data counts as well.
     let unseen = |i: usize| nrmse(&finalists[i].losses);
     let id = |i: usize| finalists[i].candidate.meta.id;
     let as_well = |i: usize| {

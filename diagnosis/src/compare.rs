@@ -1,4 +1,4 @@
-//! A model against measurements: free run and one step.
+//! Comparing a model with measurements: free run and one-step prediction.
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::error::CompareError;
 use crate::measurements::Measurements;
-use crate::observer::{Correction, hold};
+use crate::observer::{Correction, attach_observer};
 use crate::prediction::{InitialStates, Solution, one_step};
 use crate::progress::{Stage, Work};
 use crate::score::{SignalScore, Tally, overall};
@@ -26,8 +26,8 @@ pub struct Comparison {
     pub signals: Vec<SignalScore>,
     /// Faults of the log.
     pub faults: Vec<Fault>,
-    /// How the free run was held to the measurements; absent where it is simulated from the inputs
-    /// alone.
+    /// How an observer corrected the free run by the measurements. Absent where the run is simulated from the
+    /// inputs alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observer: Option<Correction>,
     /// Where the free run fails, the most telling first.
@@ -39,7 +39,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// A comparison of which only the error is known: what is left of one that was not made.
+    /// A comparison of which only the error is known: the work was cancelled before it was made.
     pub(crate) fn of_error(nrmse: f64) -> Self {
         Self {
             nrmse,
@@ -77,7 +77,7 @@ pub struct SignalTrace {
     pub unit: String,
     /// What was measured (NaN: missing).
     pub measured: Vec<f64>,
-    /// The model simulated from the inputs alone, or [held](Comparison::observer) to the measurements.
+    /// The model simulated from the inputs alone, or corrected by an [observer](Comparison::observer).
     pub free_run: Vec<f64>,
     /// The model's prediction from the previous sample.
     pub one_step: Vec<f64>,
@@ -86,8 +86,8 @@ pub struct SignalTrace {
 /// Simulates `model` over `runs` from the inputs alone, from initial states that are estimated for
 /// each run, and predicts each sample from the one before.
 ///
-/// A model that is unstable or integrates cannot be simulated like that: it is held to the
-/// measurements by an observer, as slow as it may be, and [`Comparison::observer`] says so.
+/// A model that is unstable or integrates cannot be simulated like that. An observer corrects its free run by
+/// the measurements, as slowly as possible, and [`Comparison::observer`] says so.
 ///
 /// # Errors
 ///
@@ -109,7 +109,7 @@ pub fn compare(
     }
     let values = model.values();
     work.tell(Stage::Comparing, 0, runs.len() as u64);
-    let runs = hold(model, &values, runs, work)?;
+    let runs = attach_observer(model, &values, runs, work)?;
     let initial = InitialStates::estimate(model, &values, &runs, work)?;
     let mut tallies = vec![Tally::default(); model.measured.len()];
     let mut traces = Vec::with_capacity(runs.len());

@@ -10,14 +10,14 @@ use crate::trial::{Judged, Nominal};
 
 /// Explanations that are reported.
 pub(crate) const REPORTED: usize = 12;
-/// What candidates are weighed by.
+/// What decides among the candidates.
 pub(crate) struct Evidence<'a> {
     pub(crate) nominal: &'a Nominal<'a>,
     /// Losses of the plain model on what no fit saw.
     pub(crate) unseen: &'a Losses,
     /// Its error on what it was fitted to.
     pub(crate) nominal_fit: f64,
-    /// What noise alone would leave of what judges, and of what was fitted to.
+    /// The error that noise alone would leave on the judging data, and on the fitted data.
     pub(crate) floor: f64,
     pub(crate) floor_fit: f64,
     /// Least share of the standard deviation that an explanation must account for.
@@ -79,7 +79,7 @@ impl Evidence<'_> {
         unseen > criteria.beats || (unseen > 0.0 && explanation.significance > criteria.certain)
     }
 
-    /// Whether the chosen explanation is what is missing: better than nothing beyond doubt, by enough to
+    /// Whether the chosen explanation is what is missing: significantly better than no effect, by enough to
     /// matter, and determined by the log.
     fn is_missing(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
@@ -87,7 +87,7 @@ impl Evidence<'_> {
         let explained = (nrmse(self.nominal.rank).powi(2) - left.powi(2))
             .max(0.0)
             .sqrt();
-        // Down to the noise, or a good part of what there was to explain.
+        // It leaves hardly more than noise, or it explains a good part of the error.
         let complete =
             left < criteria.complete * self.floor && explained > criteria.matters * self.floor;
         let matters = complete || explained > (criteria.matters * self.floor).max(self.least);
@@ -97,8 +97,8 @@ impl Evidence<'_> {
             && determined(explanation, criteria.undetermined)
     }
 
-    /// An explanation with which the log is explained and the test recording is not: what is missing did
-    /// not show in the log so that it could be told from something else.
+    /// An explanation that explains the log but not the test recording: the log shows that something is
+    /// missing, but cannot tell what.
     fn explains_log_alone<'e>(&self, explanations: &'e [Explanation]) -> Option<&'e Explanation> {
         let enough = self.missing().explained * self.floor_fit;
         explanations
@@ -107,7 +107,7 @@ impl Evidence<'_> {
             .filter(|_| self.nominal_fit >= enough)
     }
 
-    /// Whether the test recording shows something that the log cannot tell of.
+    /// Whether the test recording shows something that the log cannot identify.
     fn blind(&self, explained: bool) -> bool {
         self.nominal.holdout.test.is_some()
             && self.above_floor(self.error())
@@ -115,8 +115,8 @@ impl Evidence<'_> {
     }
 }
 
-/// Whether the log determines anything of the effect: what it cannot tell from the plant's own
-/// parameters is not found, however well a test recording speaks of it.
+/// Whether the log determines any parameter of the effect. An effect that cannot be told from the plant's own
+/// parameters is not found, even if a test recording agrees with it.
 fn determined(explanation: &Explanation, undetermined: f64) -> bool {
     let says_nothing = |p: &Estimate| match p.verdict {
         ParameterVerdict::Flat

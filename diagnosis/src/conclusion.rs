@@ -24,15 +24,15 @@ pub struct Level {
 pub enum Conclusion {
     /// An effect of the library explains what the model does not.
     EffectMissing,
-    /// The model explains the measurements as far as their noise lets tell.
+    /// The model explains the measurements down to their noise.
     NothingMissing,
-    /// Something is missing, and nothing in the library is it.
+    /// Something is missing, and no effect of the library explains it.
     UnknownEffect,
-    /// The recording cannot carry the model.
+    /// The recording does not say enough: too short, without motion, or blind to what the test shows.
     DataInsufficient,
-    /// The recording is at fault.
+    /// The recording has a fault that makes any fit meaningless.
     LogFaulty,
-    /// The work was cancelled: what was found until then is there, and nothing is concluded from it.
+    /// The work was cancelled. What was found until then is given; nothing is concluded from it.
     Cancelled,
 }
 
@@ -55,9 +55,8 @@ pub struct Explanation {
     pub nrmse: f64,
     /// The effect's parameters, by their ids.
     pub parameters: BTreeMap<String, Estimate>,
-    /// How many standard errors it is from doing nothing: root of the likelihood ratio on all
-    /// samples that are independent of each other; NaN (`null`) for one that was only looked at when the
-    /// work was cancelled.
+    /// How many standard errors it is from having no influence: the root of the likelihood ratio over all
+    /// independent samples. NaN (`null`) where the work was cancelled after a first look at it.
     pub significance: f64,
     /// Candidates that these data cannot tell from it.
     pub indistinguishable_from: Vec<EffectAt>,
@@ -95,15 +94,15 @@ pub struct Diagnosis {
     pub candidates: Vec<Explanation>,
     /// Where the model fails, in words.
     pub where_it_fails: Vec<Statement>,
-    /// The force that is missing where no effect of the library is it.
+    /// The missing force, where no effect of the library explains it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_force: Option<ResidualForce>,
     /// Faults of the log.
     pub faults: Vec<Fault>,
     /// Experiments that would tell more.
     pub advice: Vec<Advice>,
-    /// How free runs were held to the measurements; absent where they are simulated from the inputs
-    /// alone.
+    /// How an observer corrected the free runs by the measurements. Absent where they are simulated from the
+    /// inputs alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observer: Option<Correction>,
     /// The nominal model, fitted.

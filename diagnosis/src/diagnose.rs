@@ -13,7 +13,7 @@ use crate::floor::floor;
 use crate::holdout::{Holdout, Judgement};
 use crate::judge::{Losses, nrmse};
 use crate::measurements::Measurements;
-use crate::observer::{Correction, hold_alike};
+use crate::observer::{Correction, attach_same_observer};
 use crate::output_error::prepare;
 use crate::prediction::{Solution, signal_rms};
 use crate::problem::Problem;
@@ -51,7 +51,7 @@ pub(crate) fn diagnose_above(
     work: &Work<'_>,
 ) -> Result<Diagnosis, FitError> {
     measurements.check(model)?;
-    // Cancelled until it is done: each step adds what it finds.
+    // It counts as cancelled until the last step is done. Each step adds what it finds.
     let mut diagnosis = Diagnosis::begun(measurements.faults);
     if refused(&mut diagnosis, model, measurements, work.criteria()) {
         return Ok(diagnosis);
@@ -82,7 +82,7 @@ impl Diagnosis {
     }
 }
 
-/// Whether the measurements cannot carry the model: then that is the diagnosis.
+/// Whether the log is faulty or too short to fit a model to. If so, that is the diagnosis.
 fn refused(
     diagnosis: &mut Diagnosis,
     model: &Model,
@@ -113,7 +113,7 @@ fn steps(
     let silent = work.silently();
     let prepared = prepare(model, measurements.runs, &FitSettings::default(), &silent)?;
     let (model, runs) = (&*prepared.model, &*prepared.runs);
-    let test = (measurements.test).map(|test| hold_alike(model, test, runs, work));
+    let test = (measurements.test).map(|test| attach_same_observer(model, test, runs, work));
     let test = test.transpose()?;
     let criteria = work.criteria();
     let holdout = Holdout::new(model, runs, test.as_deref(), &criteria.holdout);
@@ -228,8 +228,8 @@ fn search(
         nominal.holdout.runs,
         work,
     )?;
-    let held = diagnosis.observer.is_some();
-    let all = candidates(nominal.model, &rms, held, &work.criteria().search);
+    let observed = diagnosis.observer.is_some();
+    let all = candidates(nominal.model, &rms, observed, &work.criteria().search);
     let search = Search {
         all: &all,
         nominal,

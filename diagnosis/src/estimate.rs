@@ -28,7 +28,7 @@ impl ParameterVerdict {
     pub fn text(self) -> &'static str {
         match self {
             ParameterVerdict::Good => "pinned by the data",
-            ParameterVerdict::Frozen => "held at the file's value",
+            ParameterVerdict::Frozen => "frozen at the file's value",
             ParameterVerdict::Dead => "no influence on what is measured here",
             ParameterVerdict::Flat => "only a combination with other parameters is determined",
             ParameterVerdict::NotPinned => "interval wider than the value",
@@ -47,7 +47,7 @@ pub struct Estimate {
     pub unit: String,
     /// Standard error, in that unit; `null` where the data say nothing.
     pub std_error: Option<f64>,
-    /// Interval that holds the true value with 95 % confidence.
+    /// Interval that contains the true value with 95 % confidence.
     pub interval95: Option<[f64; 2]>,
     /// What the data say of it.
     pub verdict: ParameterVerdict,

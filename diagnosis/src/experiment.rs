@@ -22,9 +22,9 @@
 //! s² = cᵀ (JᵀJ)⁻¹ Jᵀ cov(e) J (JᵀJ)⁻¹ c
 //! ```
 //!
-//! Assumptions: the model's values are near enough for its response to be; the robot starts at rest;
-//! distances count the noise as white, as a diagnosis does (that of encoder counts is smaller at low
-//! frequencies); the chosen inputs are the best of a list, not of all there are.
+//! Assumptions: the model's values are close enough to predict its response; the robot starts at rest; distances
+//! count the noise as white, as a diagnosis does (that of encoder counts is smaller at low frequencies); the
+//! chosen inputs are the best of a list, and not of all possible ones.
 //!
 //! References: A. C. Atkinson, V. V. Fedorov (1975), "The design of experiments for discriminating
 //! between two rival models", Biometrika 62, 57–70; A. C. Atkinson, A. N. Donev (1992), "Optimum
@@ -434,7 +434,7 @@ impl<'m> Design<'m> {
             (
                 Promise::CannotBeSeparated,
                 format!(
-                    "{name} cannot be pinned with inputs alone: with the signals that are measured it has no influence of its own under any of the experiments; hold another parameter that does the same at a measured value, or add a sensor"
+                    "{name} cannot be pinned with inputs alone: with the signals that are measured it has no influence of its own under any of the experiments; freeze another parameter that does the same at a measured value, or add a sensor"
                 ),
             )
         } else {

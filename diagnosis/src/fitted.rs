@@ -13,7 +13,7 @@ use crate::settings::Method;
 /// The result of a fit.
 #[derive(Clone, Debug, Serialize)]
 pub struct Fit {
-    /// The fitted model held against the recording it was fitted to (or the test recording).
+    /// The fitted model compared with the recording it was fitted to, or with the test recording.
     #[serde(flatten)]
     pub comparison: Comparison,
     /// The parameters by name.
@@ -31,8 +31,8 @@ pub struct Fit {
     pub iterations: u64,
     /// Combinations of parameters that the data do not determine, in words.
     pub flat: Vec<String>,
-    /// The work was cancelled: these are the best values found until then. Errors of values and errors by
-    /// signal are missing where there was no time for them.
+    /// The work was cancelled: these are the best values found until then. Standard errors and errors by signal
+    /// are missing.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub cancelled: bool,
     /// The fitted model.

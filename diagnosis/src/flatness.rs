@@ -37,7 +37,8 @@ impl Flatness {
     ) -> Self {
         let least = criteria.flat * criteria.flat;
         let n = norms.len();
-        // The unknowns are balanced: a dead one is dead on the scale of its declaration.
+        // The unknowns are scaled by their influence. Whether one is dead is asked on the scale of its
+        // declaration.
         let dead: Vec<bool> = norms
             .iter()
             .enumerate()

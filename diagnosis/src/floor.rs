@@ -9,13 +9,13 @@ use crate::score::Tally;
 
 /// `nrmse` over all signals of a model without any fault.
 ///
-/// Counted encoders: the standard deviation of rounding, from their resolution
-/// ([`loopsight_model::sensor::Encoder::noise`]). Other sensors: third differences of the
-/// measurement, in which a smooth motion vanishes and white noise of variance `σ²` has the variance
-/// `20 σ²`; the median keeps jumps of the motion out. A sensor that is read more often than it has
-/// something new (a bus that updates every 20 ms, a coarse scale) is late by anything between
-/// nothing and its hold time `h`: the differences are those of what is new, and the age adds
-/// `(rate · h)²/12`.
+/// * Encoder counts: the standard deviation of rounding, from their resolution
+///   ([`loopsight_model::sensor::Encoder::noise`]).
+/// * Other sensors: third differences of the measurement. In them a smooth motion vanishes, and white noise of
+///   variance `σ²` has the variance `20 σ²`. The median keeps jumps of the motion out.
+/// * A sensor that is read more often than it has a new value (a bus that updates every 20 ms, a coarse scale):
+///   its value is old by anything between zero and its update time `h`. Differences are taken between new
+///   values, and the age adds `(rate · h)²/12`.
 pub(crate) fn floor(model: &Model, runs: &[Run], criteria: &LogCriteria) -> f64 {
     let n = model.measured.len();
     let sum: f64 = model

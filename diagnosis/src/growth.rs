@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::criteria::FreeRunCriteria;
 
-/// Growth beyond which there is no need to look further.
+/// Beyond this growth the answer is certain, and numbers would soon overflow.
 const CERTAINLY: f64 = 1e9;
 /// Instants of a run from which errors are followed, as fractions of its length.
 const STARTS: [f64; 3] = [0.0, 0.25, 0.5];
@@ -62,7 +62,7 @@ pub(crate) fn unstable(path: &Path, criteria: &FreeRunCriteria) -> bool {
     radius(&transition, &vec![1.0; first.ncols()]) > criteria.exponential
 }
 
-/// How errors of the state grow where they grow too much.
+/// How errors of the state grow, where they grow too much for a free run.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Growth {
     /// Time in which they do, s.
@@ -121,7 +121,7 @@ impl Growth {
                         break;
                     }
                 }
-                // What a stiff loop makes of an error is large and soon over.
+                // In a stiff system an error becomes large for a moment, and is soon over.
                 if let (Some((time, rate)), true) = (grown, late > criteria.growth) {
                     times.push(time);
                     rates.push(rate);

@@ -1,4 +1,4 @@
-//! Which samples a fit may see, and how the others judge it.
+//! Validation: which samples a fit may see, and how the others judge it.
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
@@ -22,9 +22,11 @@ pub(crate) struct Holdout<'a> {
 }
 
 impl<'a> Holdout<'a> {
-    /// With `test`, all of `runs` is seen and `test` judges. Without, every so many blocks one of each run
-    /// judges, another one in each run, never the first, which the initial state needs: the free run goes on through it, so delays, friction and
-    /// slow changes are judged in motion and over the whole length.
+    /// With `test`, the fits see all of `runs`, and `test` judges.
+    ///
+    /// Without, each run is cut into blocks of time, and one in every few judges: other blocks in each run,
+    /// and never the first, which the initial state needs. The free run goes on through these blocks, so that
+    /// delays, friction and slow changes are judged in motion and over the whole length.
     pub(crate) fn new(
         model: &Model,
         runs: &'a [Run],
@@ -112,9 +114,9 @@ impl<'a> Holdout<'a> {
 pub(crate) struct Judgement {
     /// Losses on what was not seen: mean over the signals of their squared errors over their variances.
     pub(crate) losses: Losses,
-    /// What candidates are ranked by: those and the losses on what was seen. A transient happens once in
-    /// a run: whether it was explained must count, wherever it falls. A handful of parameters more
-    /// cannot fake that on thousands of samples.
+    /// What candidates are ranked by: losses on seen and unseen samples. A transient happens once in a run,
+    /// and whether it is explained must count wherever it falls. A few more parameters cannot fake that on
+    /// thousands of samples.
     pub(crate) rank: Losses,
 }
 

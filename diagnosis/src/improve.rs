@@ -60,7 +60,7 @@ impl State {
         }
     }
 
-    /// Diagnoses the present model; the first time it is fitted by that, and the first step.
+    /// Diagnoses the present model. The first diagnosis also fits it, which is the first step.
     fn diagnose(
         &mut self,
         measurements: &Measurements<'_>,
@@ -86,7 +86,7 @@ impl State {
         Ok(diagnosis)
     }
 
-    /// Adds what the diagnosis of a `round` named, and puts right what that changes.
+    /// Adds what the diagnosis of a `round` named, and corrects earlier steps where that changes them.
     fn add(
         &mut self,
         best: Explanation,

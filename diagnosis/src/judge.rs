@@ -1,4 +1,4 @@
-//! Which of two models explains held-out data better, and whether that means anything.
+//! Which of two models explains the validation data better, and whether the difference is significant.
 
 use crate::criteria::WindowCriteria;
 use crate::progress::{Cancelled, Work};

@@ -65,8 +65,8 @@ pub(crate) fn speed(time: &[f64], values: &[f64], motion: Motion) -> Vec<f64> {
         .collect()
 }
 
-/// The samples at which the direction turns out to have changed, without those that noise around
-/// rest makes: a direction counts once `speed` leaves ±`rest`, from where it left zero.
+/// The samples at which the direction changes. Noise around rest changes no direction: a direction counts once
+/// `speed` leaves ±`rest`, and from the sample at which it left zero.
 pub(crate) fn changes(speed: &[f64], rest: f64) -> Vec<usize> {
     let mut changes = Vec::new();
     let mut direction = 0.0;

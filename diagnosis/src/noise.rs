@@ -18,7 +18,7 @@ pub(crate) struct Arma {
     pub(crate) variance: f64,
 }
 
-/// Largest magnitude of `a`: beyond it the noise would not have a variance to speak of.
+/// Largest magnitude of `a`: at 1 the noise would have no finite variance.
 const LARGEST_A: f64 = 0.999;
 
 impl Arma {
@@ -140,9 +140,9 @@ pub(crate) struct Block {
 ///
 /// A noise model [`Arma`] per signal takes the bulk of the colour out of the residuals, `ε = H⁻¹ e`
 /// and `h = Hᵀ J`, so that `Jᵀ e = Σ_k s(k)` with the scores `s(k) = Σ_i h_i(k) ε_i(k)` over the
-/// signals `i`. What is left (rounding at constant speed is periodic, signals from the same
-/// encoders round together, noise is larger in motion than at rest) is in the autocovariance of
-/// the scores, weighted by Bartlett's window:
+/// signals `i`. Some colour is left: rounding at constant speed is periodic, signals from the same encoders round
+/// together, and noise is larger in motion than at rest. It is in the autocovariance of the scores, weighted
+/// by Bartlett's window:
 ///
 /// ```text
 /// Jᵀ cov(e) J ≈ Σ_|l|<=L (1 - |l|/(L+1)) Σ_k s(k) s(k-l)ᵀ

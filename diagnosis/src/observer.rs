@@ -1,4 +1,4 @@
-//! Whether a model can be simulated from the inputs alone, and what holds it where it cannot.
+//! Whether a model can be simulated from the inputs alone, and the observer that corrects it where it cannot.
 
 use std::borrow::Cow;
 
@@ -14,7 +14,7 @@ use crate::floor;
 use crate::growth::{Growth, Linearised, Path, unstable};
 use crate::progress::{Cancelled, Work};
 
-/// How a free run was held to the measurements, and why.
+/// How an observer corrected a free run by the measurements, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Correction {
     /// `unstable` or `integrating`.
@@ -60,7 +60,7 @@ impl Correction {
             because,
             horizon_s: horizon,
             statement: format!(
-                "the model {why}: its free run is held to the measurements by an observer that forgets them within {}",
+                "the model {why}: an observer corrects its free run by the measurements, and forgets each within {}",
                 seconds(horizon)
             ),
         })
@@ -80,18 +80,18 @@ const SHORTEST: f64 = 10.0;
 const FIRST: f64 = 20.0;
 /// Noise is taken to be at least this share of a signal's standard deviation.
 const LEAST_NOISE: f64 = 1e-4;
-/// An unobserved state is no further from the truth than this many times its deviation.
+/// Cap on the uncertainty of a state that is not observed, in its deviations.
 const FURTHEST: f64 = 1e3;
 
-/// `runs` with an observer each where `model` needs one; as they are where it does not.
-pub(crate) fn hold<'r>(
+/// `runs`, each with an observer where `model` needs one; unchanged where it does not.
+pub(crate) fn attach_observer<'r>(
     model: &Model,
     values: &[f64],
     runs: &'r [Run],
     work: &Work<'_>,
 ) -> Result<Cow<'r, [Run]>, Cancelled> {
     match growth(model, values, runs, work)? {
-        Some(growth) => hold_with(model, values, runs, &growth, work),
+        Some(growth) => attach_observer_for(model, values, runs, &growth, work),
         None => Ok(Cow::Borrowed(runs)),
     }
 }
@@ -115,7 +115,7 @@ pub(crate) fn growth(
     ))
 }
 
-/// Whether `model` leaves its rest by itself within the instants `time`, at inputs of zero.
+/// Whether `model` leaves its rest without any input within the instants `time`.
 pub(crate) fn unstable_at_rest(
     model: &Model,
     values: &[f64],
@@ -141,7 +141,7 @@ pub(crate) fn unstable_at_rest(
 }
 
 /// `runs` with the observer that suits `growth`.
-pub(crate) fn hold_with<'r>(
+pub(crate) fn attach_observer_for<'r>(
     model: &Model,
     values: &[f64],
     runs: &'r [Run],
@@ -149,18 +149,18 @@ pub(crate) fn hold_with<'r>(
     work: &Work<'_>,
 ) -> Result<Cow<'r, [Run]>, Cancelled> {
     let design = Design::new(model, values, runs, work);
-    let mut held = Vec::with_capacity(runs.len());
+    let mut observed = Vec::with_capacity(runs.len());
     for run in runs {
-        match design.hold(run, growth, work)? {
-            Some(run) => held.push(run),
+        match design.observed(run, growth, work)? {
+            Some(run) => observed.push(run),
             None => return Ok(Cow::Borrowed(runs)),
         }
     }
-    Ok(Cow::Owned(held))
+    Ok(Cow::Owned(observed))
 }
 
 /// `others` with the observer that suits the horizon of `runs` and the `values` it was made for.
-pub(crate) fn hold_alike<'r>(
+pub(crate) fn attach_same_observer<'r>(
     model: &Model,
     others: &'r [Run],
     runs: &[Run],
@@ -174,12 +174,13 @@ pub(crate) fn hold_alike<'r>(
         doubling: observer.doubling,
         observed: observer.observed.clone(),
     };
-    hold_with(model, &observer.values, others, &growth, work)
+    attach_observer_for(model, &observer.values, others, &growth, work)
 }
 
 /// What the gains of an observer are found with.
 struct Design<'a> {
-    /// Without effects that remember: gains need not be exact, and a plant state is all they correct.
+    /// Without the effects that have states or memory: gains need not be exact, and they correct the plant's
+    /// state only.
     model: Model,
     values: &'a [f64],
     /// By signal.
@@ -226,7 +227,12 @@ impl<'a> Design<'a> {
     }
 
     /// None where the filter diverges.
-    fn hold(&self, run: &Run, growth: &Growth, work: &Work<'_>) -> Result<Option<Run>, Cancelled> {
+    fn observed(
+        &self,
+        run: &Run,
+        growth: &Growth,
+        work: &Work<'_>,
+    ) -> Result<Option<Run>, Cancelled> {
         let horizon = growth.horizon.max(SHORTEST * run.median_period());
         let nx = self.model.n_states();
         let stride = nx * run.n_measured();
@@ -237,7 +243,7 @@ impl<'a> Design<'a> {
             .iter()
             .position(|t| t - run.time()[0] > 3.0 * horizon)
             .unwrap_or(run.len());
-        // The initial state is estimated, so the gains begin as they go on.
+        // The initial state is estimated, so the gains begin at their steady values.
         let Some(uncertain) = self.filter(run, warm, horizon, &uncertain, work, |_| {})? else {
             return Ok(None);
         };
@@ -273,10 +279,10 @@ impl<'a> Design<'a> {
         }))
     }
 
-    /// The extended Kalman filter without process noise, that forgets: what was measured `t` ago has
-    /// the weight `e^(-2t/fade)`, so that no error lasts longer, and an unstable mode is turned
-    /// around. With `A` the derivative of the state by the state before, and `C` that of the
-    /// measurement (a mean sees the interval, not its end),
+    /// An extended Kalman filter with fading memory and without process noise: a measurement made `t` ago has the
+    /// weight `e^(-2t/fade)`. So no error lasts longer, and an unstable mode is stabilised. With `A` the
+    /// derivative of the state by the state before, and `C` that of the measurement (a sensor of means sees the
+    /// interval, and not its end),
     ///
     /// ```text
     /// P <- e^(2h/fade) P    S = C P Cᵀ + R    K = A P Cᵀ S⁻¹    P <- A P Aᵀ - K S Kᵀ

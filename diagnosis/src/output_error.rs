@@ -15,7 +15,7 @@ use crate::estimate::{Estimate, ParameterVerdict};
 use crate::fitted::Fit;
 use crate::flatness::Flatness;
 use crate::noise;
-use crate::observer::{growth, hold_with};
+use crate::observer::{attach_observer_for, growth};
 use crate::prediction::InitialStates;
 use crate::problem::{Problem, declared};
 use crate::progress::{Cancelled, Work};
@@ -87,20 +87,21 @@ pub(crate) struct Prepared<'a> {
     pub(crate) runs: Cow<'a, [Run]>,
 }
 
-/// Horizons of the rounds in which an observer is made to suit the parameters, as shares of the last
-/// one: from wrong parameters a long free run leads nowhere.
+/// An observer is made for the parameters, and parameters are fitted with the observer, in rounds. These are the
+/// rounds' horizons as shares of the last one: from wrong parameters a long free run leads nowhere.
 const ROUNDS: [f64; 4] = [0.25, 0.5, 1.0, 1.0];
-/// Effort of one of them.
+/// Effort of the fit of one round.
 const ROUND: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
 };
 
-/// `model` and `runs` as they are where the model can be simulated from the inputs alone. Where it
-/// cannot, the runs are held to the measurements, and the model has the values that the observer was
-/// made for, fitted: one that suits the model makes its errors white, and only those leave the
-/// parameters unbiased where the inputs come from a loop that feeds the measurements back (L. Ljung,
-/// 1999, "System Identification", 2nd edition, section 13.4).
+/// `model` and `runs` unchanged where the model can be simulated from the inputs alone.
+///
+/// Where it cannot, the runs get an observer, and the model gets the fitted values that the observer was made for.
+/// An observer that suits the model makes its errors white. Only white errors leave the parameters unbiased
+/// where the inputs come from a loop that feeds the measurements back (L. Ljung, 1999, "System Identification",
+/// 2nd edition, section 13.4).
 pub(crate) fn prepare<'a>(
     model: &'a Model,
     runs: &'a [Run],
@@ -121,15 +122,15 @@ pub(crate) fn prepare<'a>(
     for share in ROUNDS {
         let mut shortened = growth.clone();
         shortened.horizon *= share;
-        prepared.runs = hold_with(model, &values, runs, &shortened, work)?;
+        prepared.runs = attach_observer_for(model, &values, runs, &shortened, work)?;
         present.set_values(&values);
         let mut problem = Problem::new(&present, &prepared.runs, work.silently())?;
         let states = InitialStates::guess(&present, &values, &prepared.runs).states;
         values = problem.solve_from(&values, &states, ROUND)?.values;
-        // Once held, always held: what needs no observer with it may need one without.
+        // The observer stays: with it errors may no longer grow, and without it they would again.
         growth = self::growth(model, &values, runs, work)?.unwrap_or(growth);
     }
-    prepared.runs = hold_with(model, &values, runs, &growth, work)?;
+    prepared.runs = attach_observer_for(model, &values, runs, &growth, work)?;
     present.set_values(&values);
     prepared.model = Cow::Owned(present);
     Ok(prepared)
@@ -166,8 +167,8 @@ fn row_norms(jacobian: &DMatrix<f64>) -> (Vec<f64>, f64) {
     (norms, median)
 }
 
-/// A shaft about to break loose is a switch: at that instant the free run answers to its parameters
-/// without bound, all of them alike, and one such row would hide what the others tell.
+/// A shaft that is about to break loose acts like a switch: at that instant the free run is extremely sensitive to
+/// all parameters alike. One such row would hide what the other rows say.
 fn limit_rows(jacobian: &mut DMatrix<f64>, steep: f64) {
     let (norms, median) = row_norms(jacobian);
     let limit = steep * median;
@@ -189,7 +190,7 @@ impl Problem<'_> {
     pub(crate) fn result(&self, solution: &DVector<f64>) -> Result<Fit, Cancelled> {
         let (mut values, _) = self.unpack(solution);
         for i in &self.free {
-            // The solver stays strictly inside the range; at its end the end is meant.
+            // The solver stays strictly inside the range. Next to its end, the end is meant.
             let declaration = self.model.parameters[*i].declaration;
             for end in [declaration.bounds().0, declaration.bounds().1] {
                 if (values[*i] - end).abs() < 1e-9 * self.model.parameters[*i].scale() {
@@ -231,7 +232,7 @@ impl Problem<'_> {
                 let (low, high) = parameter.declaration.bounds();
                 if known {
                     estimate.std_error = Some(error);
-                    // A value beyond the admissible range is not believed, however likely.
+                    // The interval ends where the admissible range ends.
                     estimate.interval95 = Some([
                         (value - quantile * error).max(low),
                         (value + quantile * error).min(high),

@@ -1,4 +1,4 @@
-//! The free run with the positions as they were measured.
+//! The free run at the measured positions.
 
 use loopsight_core::{EffectMeta, Role};
 use loopsight_model::model::{Model, pseudo_inverse};
@@ -7,19 +7,18 @@ use loopsight_model::run::Run;
 use loopsight_model::simulate::{Simulator, try_follow};
 use nalgebra::DMatrix;
 
-/// Keeps the integrals of the plant (angles, ways) where the measurement has them, while the speeds
-/// run free.
+/// Sets the integrals of the plant (angles, distances) to the measured ones, while the speeds run free.
 ///
 /// ```text
 /// q(k) += J (y(k) - ŷ(k))        J = H_q⁺ where q is measured, Δt H_v⁺ where its rate v is
 /// ```
 ///
-/// with `H` the sensitivity of the measured signals to the state. An effect that reads a position
-/// (cogging, a pendulum's weight, a spring) makes the free run a maze: a model that is a little
-/// wrong has turned half a cog too far after some seconds, and the error has a minimum for each
-/// cog. With the positions as measured the effect is a known function of time, the error has one
-/// minimum, and the free run starts from there. (As an observer of which only the positions are
-/// corrected; H. D. I. Abarbanel, D. R. Creveling, R. Farsian, M. Kostuk, 2009, "Dynamical state
+/// with `H` the sensitivity of the measured signals to the state.
+///
+/// An effect that reads a position (cogging, a pendulum's weight, a spring) gives the error of the free run many
+/// minima: after some seconds a model that is a little wrong has turned half a cog too far, and each cog has
+/// its own minimum. At the measured positions the effect is a known function of time, and the error has one
+/// minimum. A fit of the free run starts from there. (It is an observer that corrects the positions only; H. D. I. Abarbanel, D. R. Creveling, R. Farsian, M. Kostuk, 2009, "Dynamical state
 /// and parameter estimation", SIAM J. Applied Dynamical Systems 8, 1341–1381, for the idea.)
 #[derive(Clone, Debug)]
 pub(crate) struct Positions {
@@ -36,8 +35,8 @@ impl Positions {
         meta.reads.iter().any(position)
     }
 
-    /// The positions that the measured signals of `model` tell; none where they tell none, or where
-    /// a sensor looks back at a position and would see it jump.
+    /// The positions that follow from the measured signals of `model`. None where no position follows, or
+    /// where an effect has memory and would see the position jump.
     pub(crate) fn of(model: &Model, values: &[f64]) -> Option<Self> {
         if model.effects.iter().any(|e| e.meta.memory) {
             return None;
@@ -114,7 +113,7 @@ pub(crate) fn run_with<S: HostReal, E>(
     mut each: impl FnMut(usize, &[S]) -> Result<(), E>,
 ) -> Result<(), E> {
     match positions {
-        // An observer holds the positions as well.
+        // An observer corrects the positions as well.
         Some(positions) if run.observer().is_none() => {
             positions.run(simulator, x0, run, n_measured, each)
         }

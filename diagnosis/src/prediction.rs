@@ -10,9 +10,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::positions::{Positions, run_with};
 use crate::progress::{Cancelled, Work};
 
-/// Plant states whose initial values are estimated: those that show at the beginning of a run, and where
-/// the runs are held to the measurements all that those say something about. The others start at
-/// zero.
+/// Plant states whose initial values are estimated: those that show in the measurements at the beginning of a
+/// run; with an observer, those that it observes. The others start at zero.
 pub(crate) fn estimated_states(model: &Model, values: &[f64], runs: &[Run]) -> Vec<usize> {
     let observer = runs.iter().find_map(|run| run.observer());
     observer.map_or_else(

@@ -46,8 +46,8 @@ pub(crate) struct Problem<'a> {
     /// Samples that the fit may see, by run; all where there is none.
     seen: Option<&'a [Vec<bool>]>,
     /// Initial states that are not estimated, by run.
-    held: Option<Vec<DVector<f64>>>,
-    /// The positions are as measured, not simulated.
+    known_states: Option<Vec<DVector<f64>>>,
+    /// Where positions are measured and not simulated.
     pub(crate) positions: Option<Positions>,
     /// The best that was seen in the first pass, and the root of its cost.
     best: RefCell<Option<(f64, Solution)>>,
@@ -58,13 +58,13 @@ impl<'a> Problem<'a> {
         Self::with(model, runs, None, None, work)
     }
 
-    /// As [`Problem::new`]; of each run only the samples that are `seen`, with initial states that
-    /// are `held` instead of estimated.
+    /// As [`Problem::new`], with only those samples of each run that are `seen`. Initial states are estimated
+    /// where they are not `known_states`.
     pub(crate) fn with(
         model: &'a Model,
         runs: &'a [Run],
         seen: Option<&'a [Vec<bool>]>,
-        held: Option<Vec<DVector<f64>>>,
+        known_states: Option<Vec<DVector<f64>>>,
         work: Work<'a>,
     ) -> Result<Self, FitError> {
         work.go_on()?;
@@ -94,7 +94,7 @@ impl<'a> Problem<'a> {
                 }
             })
             .collect();
-        let visible = match held {
+        let visible = match known_states {
             Some(_) => Vec::new(),
             None => estimated_states(model, &nominal(model), runs),
         };
@@ -133,7 +133,7 @@ impl<'a> Problem<'a> {
             cache: RefCell::new(None),
             samples,
             seen,
-            held,
+            known_states,
             positions: None,
             best: RefCell::new(None),
         })
@@ -162,7 +162,7 @@ impl<'a> Problem<'a> {
         }
         let mut best: Option<(f64, DVector<f64>)> = None;
         for values in candidates {
-            let initial = match &self.held {
+            let initial = match &self.known_states {
                 Some(states) => states.clone(),
                 None => InitialStates::guess(self.model, &values, self.runs).states,
             };
@@ -228,8 +228,8 @@ impl<'a> Problem<'a> {
         }
         let states = (0..self.runs.len())
             .map(|run| {
-                if let Some(held) = &self.held {
-                    return held[run].clone();
+                if let Some(known) = &self.known_states {
+                    return known[run].clone();
                 }
                 let mut x0 = DVector::zeros(self.model.n_states());
                 let first = self.free.len() + run * self.visible.len();
@@ -274,7 +274,7 @@ impl<'a> Problem<'a> {
         Ok(all)
     }
 
-    /// Keeps what leaves least, for when the work is cancelled.
+    /// Keeps the solution of least error, for when the work is cancelled.
     fn remember(&self, residual: &DVector<f64>, values: Vec<f64>, states: Vec<DVector<f64>>) {
         let error = residual.norm();
         let mut best = self.best.borrow_mut();

@@ -1,4 +1,4 @@
-//! What is put right in a model once another effect was added to it.
+//! Corrections to a model once another effect was added to it.
 
 use loopsight_model::model::{Attached, Model};
 use rayon::prelude::*;
@@ -13,10 +13,16 @@ use crate::output_error;
 use crate::progress::{Cancelled, Stage, Work};
 use crate::settings::FitSettings;
 
-/// Makes `model` the one to go on from after the last of `steps`, fitted: what the last one made needless
-/// goes, and its step with it; simpler effects and others that the data could not tell from those of earlier
-/// steps (by the `diagnoses` that added them) take their places where they may, and the steps then
-/// name them. Where the work is cancelled, model and steps are those of the changes made until then.
+/// Corrects `model` after the last of `steps`:
+///
+/// * an effect that the last one made needless goes, and its step with it;
+/// * a simpler effect replaces one that contains it, where the error hardly grows;
+/// * an effect that the data could not tell from an earlier one replaces it, where the error falls (the
+///   `diagnoses` of the earlier steps name them);
+/// * the sign of the last effect is made sharper while the error falls.
+///
+/// The steps then name what the model has. Where the work is cancelled, model and steps agree, with the
+/// changes made until then.
 pub(crate) fn refine(
     model: &mut Model,
     steps: &mut Vec<ImprovementStep>,
@@ -37,8 +43,8 @@ pub(crate) fn refine(
     sharpened(&mut best)
 }
 
-/// What an earlier step added goes where the error is the same without it: what looked like a dead zone
-/// may have been a part of the friction that was added after it.
+/// Takes out effects of earlier steps without which the error is the same: what looked like a dead zone may have
+/// been part of the friction that was added after it.
 fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<(), FitError> {
     let close = best.work.criteria().choice.close;
     loop {
@@ -64,9 +70,9 @@ fn without(model: &Model, effects: &[usize]) -> Option<Model> {
         .try_fold(model.clone(), |model, index| model.without_effect(*index))
 }
 
-/// A simpler effect takes the place of an added one that contains it where the error hardly grows:
-/// what looked like breakaway friction may have been friction with a delay that was still missing.
-/// The step that added it is then one that added the simpler effect.
+/// Replaces an added effect by a simpler one that it contains, where the error hardly grows: what looked like
+/// breakaway friction may have been friction with a delay that was still missing. The step then names the
+/// simpler effect.
 fn simplified(best: &mut Refined<'_>, steps: &mut [ImprovementStep]) -> Result<(), FitError> {
     let criteria = &best.work.criteria().improve;
     for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
@@ -88,8 +94,8 @@ fn simplified(best: &mut Refined<'_>, steps: &mut [ImprovementStep]) -> Result<(
     Ok(())
 }
 
-/// What the data could not tell from an effect when it was added may be told from it once another
-/// one is there: a late command from a late sensor, when the machine has friction.
+/// Replaces an added effect by one that the data could not tell from it at first, where the error falls: once
+/// friction is in the model, a late command can be told from a late sensor.
 fn reconsidered(
     best: &mut Refined<'_>,
     steps: &mut [ImprovementStep],
@@ -147,8 +153,8 @@ struct Refined<'a> {
 }
 
 impl Refined<'_> {
-    /// The best of `candidates`, each fitted, takes the place where its error is below `share` of the
-    /// present one. Those that cannot be fitted (their free run diverges) are none.
+    /// Takes the best of the fitted `candidates` where its error is below `share` of the present one. Candidates
+    /// that cannot be fitted, because their free run diverges, do not count.
     fn takes<T: Send>(
         &mut self,
         candidates: Vec<(T, Model)>,
@@ -173,7 +179,7 @@ impl Refined<'_> {
                 (error <= share * now).then_some((what, error, model))
             })
             .collect();
-        // Of changes that were not all tried none is the best.
+        // After a cancellation some changes were not tried, and the best is not known.
         self.work.go_on()?;
         let best = fitted.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
         Ok(best.map(|(what, error, model)| {
@@ -184,8 +190,8 @@ impl Refined<'_> {
     }
 }
 
-/// Where the effect of a step stands among those of `model`: once, or once for each of its channels;
-/// nowhere when another has taken its place.
+/// Indices of a step's effect in `model`: one, or one for each of its channels; none when another effect has
+/// replaced it.
 fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
     let of_place = |e: &Attached| {
         e.meta.id == place.effect && e.at.iter().all(|c| place.at.iter().any(|at| at == c.id))

@@ -12,8 +12,8 @@ use crate::progress::{Cancelled, Work};
 
 /// Calls `each(row, time, φ, y)` for every regression that the samples of `runs` give.
 ///
-/// Samples closer than `span` s to the last one used are passed over, with the mean of their
-/// inputs: a difference over a longer time stands out better from the noise.
+/// A sample less than `span` s after the last one used is skipped, and its inputs are averaged into the next: a
+/// difference over a longer time has less noise.
 pub(crate) fn for_each_row(
     regression: &mut Regression,
     runs: &[Run],

@@ -23,7 +23,7 @@ const HISTORY: usize = 2000;
 /// Runs the estimator `rls`, one per controlled state, over all samples in order.
 ///
 /// Standard errors are those of least squares with white residuals, `σ² P`; where the regressors
-/// themselves are noisy (encoder counts) the estimate is biased and the interval does not know.
+/// themselves are noisy (encoder counts) the estimate is biased, and the interval does not show it.
 pub(crate) fn fit(
     model: &Model,
     runs: &[Run],

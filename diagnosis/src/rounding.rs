@@ -7,8 +7,7 @@ use crate::problem::Problem;
 use crate::progress::Cancelled;
 
 impl Problem<'_> {
-    /// Turns to the second pass if the residuals at `solution` are rounded counts; returns where it
-    /// starts.
+    /// Begins the second pass if the residuals at `solution` are those of rounded counts; returns its start.
     pub(crate) fn whiten(
         &mut self,
         solution: &DVector<f64>,

@@ -37,8 +37,10 @@ pub(crate) struct Found {
 impl Search<'_> {
     /// The candidates that do best.
     ///
-    /// All are asked what one step promises, some are looked at, those that contain one that did well
-    /// from where that one ended; the best are fitted.
+    /// 1. One Gauss–Newton step for each start of each candidate says what it promises.
+    /// 2. The most promising are fitted with a few iterations: a first look. A candidate that contains another
+    ///    one is looked at from where that one ended.
+    /// 3. The best are fitted to the end.
     pub(crate) fn run(&self) -> Found {
         let looked = self.looked_at();
         if self.work.is_cancelled() {
@@ -96,8 +98,8 @@ impl Search<'_> {
         let mut tried: BTreeSet<usize> = first.iter().map(|(i, _)| *i).collect();
         let mut looked = Vec::new();
         self.look_at(&first, waiting.len(), &mut looked);
-        // What contains another candidate is looked at after it, from where that one ended; as it promised
-        // only where that one led nowhere.
+        // A candidate that contains another one comes after it, and starts from where that one ended. Where
+        // that one led nowhere it starts from its own best start.
         while !self.work.is_cancelled() {
             let mut next = self.grown(&looked, &tried, &mut waiting, duration);
             next.append(&mut waiting);
@@ -125,7 +127,7 @@ impl Search<'_> {
             .collect();
         promising.sort_by(|a, b| a.0.total_cmp(&b.0));
         let criteria = self.criteria();
-        // No effect with many starts may crowd the others out.
+        // An effect with many starts must not crowd the others out.
         let mut taken = vec![0; self.all.len()];
         promising.retain(|(_, (i, _))| {
             taken[*i] += 1;
@@ -148,8 +150,8 @@ impl Search<'_> {
         looked.extend(found.collect::<Vec<_>>());
     }
 
-    /// Whether a candidate may be found from where another one ended: strong breakaway friction is
-    /// found from dry friction, not from none, and two levels from one for both.
+    /// Whether a candidate should start from where another one ended: strong breakaway friction is found from
+    /// dry friction and not from none, and a level for each wheel from one level for both.
     fn grows(&self, i: usize, from: usize) -> bool {
         let (candidate, other) = (&self.all[i], &self.all[from]);
         let contains =
@@ -159,7 +161,8 @@ impl Search<'_> {
         (contains || divides) && !other.separate
     }
 
-    /// Attempts at candidates that were not tried yet, from where simpler ones ended; those no longer wait.
+    /// Attempts at candidates that were not tried yet, starting from where simpler ones ended. They are taken
+    /// out of `waiting`.
     fn grown(
         &self,
         looked: &[(usize, Judged)],
@@ -230,7 +233,7 @@ fn contest(mut looked: Vec<(usize, Judged)>, criteria: &Criteria) -> Vec<Judged>
         let elsewhere = siblings.first().is_some_and(|best| {
             best.candidate.at != found.candidate.at && error > criteria.elsewhere * best.error()
         });
-        // A special case of one that did well may only not have come to its end.
+        // A special case of one that did well may only need more iterations.
         let special = |j: &Judged| is_special(&found.candidate, &j.candidate);
         let best = finalists.first();
         let far = best.is_some_and(|best| error > criteria.behind * best.error())
@@ -248,8 +251,9 @@ fn contest(mut looked: Vec<(usize, Judged)>, criteria: &Criteria) -> Vec<Judged>
     finalists
 }
 
-/// Whether a candidate is needless beside another one that is about as good: its special case, the same
-/// alike at all channels, or at more of them (on a straight run one wheel stands for both: then both).
+/// Whether a candidate is needless beside another one that is about as good: a special case of it, the same effect
+/// with common parameters, or the same effect at more channels (on a straight run one wheel looks like both:
+/// then both are meant).
 fn spares(other: &Candidate, candidate: &Candidate) -> bool {
     let same = other.meta.id == candidate.meta.id && !other.separate;
     let alike = same && candidate.separate && other.at == candidate.at;

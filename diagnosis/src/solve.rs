@@ -21,7 +21,7 @@ pub(crate) struct Effort {
 }
 
 impl Effort {
-    /// To far below the standard errors.
+    /// Until changes are far below the standard errors.
     pub(crate) const FULL: Self = Self {
         iterations: 100,
         tolerance: 1e-9,
@@ -50,7 +50,7 @@ impl Problem<'_> {
         Ok(self.solution(&self.solve(start, effort)?))
     }
 
-    /// Scaled unknowns from which the cost falls no further, from `start`.
+    /// The scaled unknowns of least cost, from `start`.
     pub(crate) fn solve(
         &self,
         start: &DVector<f64>,

@@ -1,4 +1,4 @@
-//! From where a candidate is tried.
+//! Starting values of candidates.
 
 use std::collections::BTreeMap;
 
@@ -10,8 +10,8 @@ use crate::trial::Judged;
 /// Shares of the flow that a speed to be estimated starts from.
 const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
 
-/// Values to start a candidate from: the `nominal` model's, without those of an effect that it takes
-/// the place of; what has the same name begins where that one was.
+/// Starting values of a candidate: those of the `nominal` model. Where the candidate replaces an effect, parameters
+/// of the same name start at that effect's values.
 pub(crate) fn first_starts(candidate: &Candidate, nominal: &Model, duration: f64) -> Vec<Vec<f64>> {
     let mut base = nominal.values();
     let mut known = BTreeMap::new();
@@ -42,8 +42,8 @@ pub(crate) fn grown_starts(
     starts(candidate, &values[..own.start], &known, duration)
 }
 
-/// Values to start a candidate from: those of the rest of the model from `base`, its own as `known`,
-/// else a noticeable step from neutral.
+/// Starting values of a candidate: `base` for the rest of the model; its own parameters as `known`, else a
+/// noticeable step from neutral.
 fn starts(
     candidate: &Candidate,
     base: &[f64],

@@ -1,4 +1,4 @@
-//! Whether a recording can carry a model at all.
+//! Whether a recording says enough to fit a model to it.
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;

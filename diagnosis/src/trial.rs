@@ -24,8 +24,8 @@ pub(crate) const FINAL: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
 };
-/// Longest integration steps of a promise and of a first look, in those of the plant. Where a position
-/// is read the short one serves both: cogs run by.
+/// Longest integration steps of a promise and of a first look, in steps of the plant. Where the effect reads a
+/// position both take the shorter one: a long step would pass over a cog.
 const PROMISE_STEPS: f64 = 4.0;
 const LOOK_STEPS: f64 = 2.0;
 
@@ -65,9 +65,8 @@ impl Judged {
     }
 }
 
-/// The model of a candidate with coarser steps, and with softened signs where it begins with a
-/// regression. A file that asks for finer steps than usual has lags
-/// that no longer ones stand.
+/// The model of a candidate with longer integration steps, and with widely smoothed signs where it begins with a
+/// regression. A file that asks for shorter steps than usual keeps them: its lags need them.
 fn coarse(candidate: &Candidate, steps: f64) -> Model {
     let mut model = match candidate.shape() {
         Some(_) => candidate.softened(),
@@ -98,15 +97,15 @@ impl<'a> Nominal<'a> {
         &self.work.criteria().search
     }
 
-    /// The problem of fitting `model` to what may be seen; with initial states that are `held`, or
-    /// estimated. None where the work was cancelled.
-    fn problem<'m>(&self, model: &'m Model, held: Option<&[DVector<f64>]>) -> Option<Problem<'m>>
+    /// The problem of fitting `model` to what a fit may see. Initial states are estimated where they are not
+    /// known. None where the work was cancelled.
+    fn problem<'m>(&self, model: &'m Model, known: Option<&[DVector<f64>]>) -> Option<Problem<'m>>
     where
         'a: 'm,
     {
-        let held = held.map(<[DVector<f64>]>::to_vec);
+        let known = known.map(<[DVector<f64>]>::to_vec);
         let seen = self.holdout.seen.as_deref();
-        Problem::with(model, self.holdout.runs, seen, held, self.work.silently()).ok()
+        Problem::with(model, self.holdout.runs, seen, known, self.work.silently()).ok()
     }
 }
 
@@ -120,7 +119,7 @@ pub(crate) fn promise(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_
         PROMISE_STEPS
     };
     let mut model = coarse(candidate, steps);
-    // While what is linear in it is neutral, its shape says nothing: a pass of derivatives less.
+    // While its linear parameters are neutral, the others have no influence: they need no derivatives.
     let shape = candidate.shape();
     for index in shape.iter().flatten() {
         model.parameters[*index].free = false;
@@ -132,7 +131,7 @@ pub(crate) fn promise(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_
     let (before, after) = problem.promise(start, states).ok()??;
     let criteria = nominal.criteria();
     match shape {
-        // With measured positions also the plain model leaves less than in its free run; where they leave
+        // At the measured positions the plain model leaves less as well than in its free run. Where it leaves
         // hardly anything, the regression says nothing.
         Some(_) => {
             let promising = after < criteria.promising * before || before < criteria.told * plain;
@@ -159,8 +158,8 @@ pub(crate) fn look(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) 
     if let Some(measured) = positions(candidate, &start) {
         let mut problem = problem()?;
         problem.positions = Some(measured);
-        // What is linear in the effect begins where a regression has it: a ripple against the true
-        // one makes a machine stick that does not.
+        // Linear parameters begin where a regression finds them. A ripple of the wrong sign would make the
+        // model stick where the machine does not.
         if let Some(shape) = candidate.shape() {
             let regressed = problem.stride(&start, states, &shape).ok()?;
             start = regressed.unwrap_or(start);
@@ -171,8 +170,8 @@ pub(crate) fn look(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) 
     Judged::of(candidate.clone(), &model, solution, nominal)
 }
 
-/// The full fit of a finalist, initial states included, with intervals: where it has a sign, as sharply
-/// as it can be, unless the machine does not stick so; then as softly as it is.
+/// The full fit of a finalist, initial states included, with intervals. A sign is as sharp as the integrator
+/// allows; where a softer one does better, its width is fitted as well.
 ///
 /// None where no fit does, or the work was cancelled.
 pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
@@ -189,7 +188,7 @@ pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fi
     let broad = fully(first, nominal, f64::INFINITY);
     let error = |found: &(Judged, Fit)| found.0.error();
     let of = |found: &Option<(Judged, Fit)>| found.as_ref().map_or(f64::INFINITY, error);
-    // A width is one more thing to be found: it must be there beyond doubt.
+    // The width is one more parameter: it must explain significantly more.
     let soft = broad
         .as_ref()
         .filter(|_| of(&broad) < of(&sharp))
@@ -198,7 +197,7 @@ pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fi
             let sure = significance(&judged.rank, &soft.0.rank, nominal.work).ok()?;
             (sure > nominal.work.criteria().missing.significant).then_some(soft)
         });
-    // Of fits that were not all done none is the best.
+    // After a cancellation some of these fits are missing, and the best is not known.
     nominal.work.go_on().ok()?;
     sharp
         .into_iter()
@@ -207,8 +206,8 @@ pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fi
         .min_by(|a, b| error(a).total_cmp(&error(b)))
 }
 
-/// Fits also the width over which the sign is smoothed, from where a fit without it ended: what is softer
-/// than usual would else be taken for another effect. None without a sign.
+/// Fits the width over which the sign is smoothed as well, from where the fit without it ended. Otherwise a
+/// softer sign than usual would be taken for another effect. None where there is no sign.
 fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     let widths = first.candidate.own_widths();
     widths.first()?;
@@ -227,7 +226,7 @@ fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     Some((judged, fit))
 }
 
-/// The full fit; none where its derivatives run wild or the effect is none of its own.
+/// The full fit. None where its derivatives grow beyond `wild`, or where the effect only sharpens a sign.
 fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit)> {
     let model = &first.candidate.model;
     let mut problem = nominal.problem(model, None)?;

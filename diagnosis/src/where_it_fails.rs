@@ -1,4 +1,4 @@
-//! Where a model fails, in words with numbers: the one place that says so.
+//! Where a model fails, in words with numbers.
 
 use loopsight_core::Signal;
 use loopsight_model::model::{Model, signals};
@@ -254,7 +254,7 @@ fn dependence(
     let (part, quantity) = best?;
     (part > criteria.depends).then(|| {
         let said = format!(
-            "the residual of {name} depends on {quantity}: its mean over that accounts for {:.0} % of the squared error",
+            "the residual of {name} depends on {quantity}: its mean at each value of that explains {:.0} % of the squared error",
             100.0 * part
         );
         (said, part)

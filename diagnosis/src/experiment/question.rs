@@ -82,8 +82,8 @@ pub enum QuestionError {
     /// The plant has no input.
     #[error("the plant has no input to experiment with")]
     NoInput,
-    /// Every parameter is held.
-    #[error("every parameter of the model is held: there is nothing to find")]
+    /// Every parameter is frozen.
+    #[error("every parameter of the model is frozen: there is nothing to find")]
     NothingFree,
     /// The model leaves its rest, or the finite numbers.
     #[error(

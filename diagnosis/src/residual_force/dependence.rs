@@ -63,7 +63,7 @@ pub struct ForceBin {
     pub expression: Option<f64>,
 }
 
-/// The model held to the measurements, as the responses need it.
+/// The model as the filter followed it through the measurements.
 pub(super) struct Followed<'a> {
     pub(super) model: &'a Model,
     pub(super) solution: &'a Solution,
@@ -85,21 +85,21 @@ struct Sorted {
 /// How the force at the channels `at` of `group` depends on each quantity there, the most telling
 /// first.
 pub(super) fn dependences(
-    held: &Followed<'_>,
+    followed: &Followed<'_>,
     group: &Group,
     at: &[usize],
     laws: &[Law],
     work: &Work<'_>,
 ) -> Result<Vec<ForceDependence>, Cancelled> {
     let mut all: Vec<ForceDependence> = (0..group.quantities.len())
-        .filter_map(|q| dependence(held, group, at, laws, q, work).transpose())
+        .filter_map(|q| dependence(followed, group, at, laws, q, work).transpose())
         .collect::<Result<_, Cancelled>>()?;
     all.sort_by(|a, b| b.share_of_variance.total_cmp(&a.share_of_variance));
     Ok(all)
 }
 
 fn dependence(
-    held: &Followed<'_>,
+    followed: &Followed<'_>,
     group: &Group,
     at: &[usize],
     laws: &[Law],
@@ -138,19 +138,19 @@ fn dependence(
         sorted.push(part);
     }
     let Responses { columns: found, .. } = responses(
-        held.model,
-        held.solution,
-        held.runs,
-        held.filtered,
+        followed.model,
+        followed.solution,
+        followed.runs,
+        followed.filtered,
         &columns,
         work,
     )?;
     let blocks = Blocks::new(
         &Responses {
-            innovations: held.innovations.clone(),
+            innovations: followed.innovations.clone(),
             columns: found,
         },
-        held.runs,
+        followed.runs,
         RIDGE,
         work,
     )?;
@@ -159,7 +159,7 @@ fn dependence(
         return Ok(None);
     };
     let left: f64 = blocks.unseen(&every).iter().sum();
-    let share = (blocks.total() - left) / (blocks.total() - held.noise);
+    let share = (blocks.total() - left) / (blocks.total() - followed.noise);
     let mut means = means.into_iter();
     let curves = directions
         .iter()

@@ -1,4 +1,4 @@
-//! The model held to the measurements, sample by sample.
+//! A Kalman filter whose only unknown is a force.
 
 use loopsight_core::{Place, Real};
 use loopsight_model::model::{Model, pseudo_inverse};

@@ -65,11 +65,11 @@ pub struct ForceExpression {
 /// What force is missing from the fitted `model`.
 ///
 /// The model follows the measurements through a filter whose only unknown is a force; what the
-/// measurements say beyond the prediction, sample by sample, is then held against what each of many
-/// forces would do there, known parameters free to bend. That is a linear regression of white
-/// residuals on exact derivatives, in the units of the forces: no measurement is differentiated, and
-/// nothing has to be known at an instant. Terms and shares are judged on blocks of time that no
-/// coefficient was found from, so that chance gives nothing.
+/// measurements say beyond the prediction is compared, sample by sample, with what each of many forces would
+/// change there; the model's own parameters may change as well. That is a linear regression of white residuals
+/// on exact derivatives, in the units of the forces. No measurement is differentiated, and nothing has to be
+/// known at an instant. Terms and shares are judged on blocks of time that no coefficient was found from, so
+/// that chance explains nothing.
 ///
 /// `None` where the plant offers no place for a force, or noise explains what there is.
 ///
@@ -153,7 +153,7 @@ pub(crate) fn of_solution(
     }
     let Some(found) = best else { return Ok(None) };
     let (bending, numbers) = found.numbers.split_at(known.len());
-    // The force that is missing is the one that the known part leaves when it is at its best.
+    // The missing force is what the model's own parameters, at their best, leave unexplained.
     let mut innovations = bent.innovations.clone();
     if !numbers.is_empty() {
         innovations -= &bent.columns * DVector::from_column_slice(bending);
@@ -164,7 +164,7 @@ pub(crate) fn of_solution(
         terms => found.group.laws(found.way, terms, numbers),
     };
     let at = found.group.at(found.way);
-    let held = Followed {
+    let followed = Followed {
         model,
         solution,
         runs,
@@ -172,7 +172,7 @@ pub(crate) fn of_solution(
         innovations: &innovations,
         noise,
     };
-    let depends_on = dependences(&held, &found.group, &at, &laws, work)?;
+    let depends_on = dependences(&followed, &found.group, &at, &laws, work)?;
     let share = (1.0 - (found.left - noise) / explainable).clamp(0.0, 1.0);
     // A force that does not vary has no variance to account for.
     let share = if share.is_nan() { 0.0 } else { share };
@@ -202,8 +202,8 @@ pub(crate) fn of_solution(
     }))
 }
 
-/// The coefficients of `columns`; zero for what is no more than noise, as one half of a wave may be,
-/// but for the first `known`.
+/// The coefficients of `columns`. Those that are no more than noise become zero, as one half of a wave may, but not
+/// the first `known`.
 fn sure(blocks: &Blocks, known: usize, columns: Vec<usize>, sure: f64) -> Option<Vec<f64>> {
     let all = blocks.solve(&columns)?;
     let stays: Vec<usize> = (0..columns.len())
