@@ -133,8 +133,8 @@ fn write_row(out: &mut impl Write, row: &[f64]) -> std::io::Result<()> {
     writeln!(out)
 }
 
-/// Time between flushes, s, by the log's time stamps and by the clock on the wall, whichever comes
-/// first: what a killed run loses at most.
+/// Longest time between flushes, s, by the log's time stamps or by the clock, whichever comes first. A run that is
+/// killed loses no more than that.
 const FLUSH_PERIOD: f64 = 1.0;
 
 /// Writes a log while it is made.
@@ -245,8 +245,8 @@ impl LogWriter {
         flushed.map_err(|e| io(&self.part, "write", &e))
     }
 
-    /// Writes what happened at a time (s), in CSV as a comment between the rows, and all rows so far to the
-    /// disk: an event is what a killed run is asked for first.
+    /// Writes what happened at a time (s), and all rows so far to the disk: after a run was killed, events are
+    /// what one looks for first. In CSV an event is a comment between the rows.
     ///
     /// # Errors
     ///

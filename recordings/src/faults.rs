@@ -36,8 +36,8 @@ pub(crate) fn check(
     found
 }
 
-/// Spread of the time steps, from the 1 % to the 99 % quantile and relative to the median, from
-/// which on it is mentioned.
+/// Jitter is reported from this spread of the time steps: between the 1 % and the 99 % quantile, relative to the
+/// median.
 const IRREGULAR: f64 = 0.1;
 
 fn irregular_time(recording: &Recording) -> Option<Fault> {

@@ -1,5 +1,11 @@
-//! Logs in and out: reading CSV and WPILib SysId JSON, mapping columns on the signals of a model,
-//! cutting a log into runs, and naming its faults before anything is fitted to it.
+//! Logs in and out: reading CSV, MCAP and WPILib SysId JSON, mapping columns to the signals of a model,
+//! cutting a log into runs, and finding its faults before anything is fitted to it.
+//!
+//! # Workflow
+//!
+//! 1. [`read`] a file as it is: a [`Source`], a table or a SysId log.
+//! 2. [`map`] its columns to the signals of a model, in SI units: a [`Recording`] of uninterrupted runs.
+//! 3. Look at [`Recording::faults`] and their [`Severity`] before a fit.
 //!
 //! ```
 //! use loopsight_core::Signal;
@@ -15,9 +21,7 @@
 //! assert!((log.runs[0].sample(2)[0] - std::f64::consts::TAU).abs() < 1e-12); // 60 rpm
 //! ```
 //!
-//! The order of work is: [`read`] the file as it is ([`Source`]), [`map`] its columns on the
-//! signals of a model in SI units ([`Recording`]), look at [`Recording::faults`] and their
-//! [`Severity`]. [`write_csv`] and [`LogWriter`] write logs that read back to the same numbers.
+//! [`write_csv`] and [`LogWriter`] write logs that read back to the same numbers.
 
 mod csv_read;
 mod csv_write;
