@@ -12,7 +12,7 @@ use cargo_metadata::{DependencyKind, Edition, Metadata, MetadataCommand};
 use loopsight_tests::repository;
 
 /// Each room, and the rooms it may depend on. Siblings do not stand in each other's line.
-const ARROWS: [(&str, &[&str]); 14] = [
+const ARROWS: [(&str, &[&str]); 15] = [
     ("core", &[]),
     ("model", &["core"]),
     ("link", &[]),
@@ -32,7 +32,9 @@ const ARROWS: [(&str, &[&str]); 14] = [
             "controllers",
         ],
     ),
-    ("recordings", &["core", "model"]),
+    // Knows files and channels, and no model.
+    ("formats", &[]),
+    ("recordings", &["core", "model", "formats"]),
     // Machines that hide an effect share no equations with the plants they are held against.
     ("hidden", &["core", "model", "recordings"]),
     ("diagnosis", &["core", "model", "recordings"]),

@@ -1,0 +1,334 @@
+//! Where a log comes from: a file, a folder, bytes, standard input; packed or not.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use ruzstd::decoding::StreamingDecoder;
+
+use crate::detect::{Content, Format, HEAD, detect};
+use crate::error::FormatError;
+
+/// How many times its own size a packed file may unfold to.
+pub const UNPACK_FACTOR: u64 = 64;
+/// What any packed file may unfold to, bytes.
+pub const UNPACK_LEAST: u64 = 16 << 20;
+/// Bytes taken from standard input or a pipe.
+pub const PIPE_MOST: u64 = 4 << 30;
+/// Wrappers within wrappers.
+const NESTED: usize = 3;
+
+/// The content of a log, unpacked, ready to be read by a reader.
+#[derive(Debug)]
+pub struct Input {
+    name: String,
+    folder: Option<PathBuf>,
+    data: Data,
+    len: u64,
+    format: Format,
+    packed: Vec<&'static str>,
+}
+
+#[derive(Debug)]
+enum Data {
+    Memory(Cursor<Vec<u8>>),
+    File(BufReader<File>),
+}
+
+impl Input {
+    /// Opens a file, a folder of a ROS 2 bag, or standard input for the path `-`.
+    ///
+    /// # Errors
+    ///
+    /// [`FormatError`] when it cannot be read, is empty, or is of a format that is not read.
+    pub fn open(path: &Path) -> Result<Self, FormatError> {
+        let io = |e: io::Error| FormatError::Io {
+            path: path.to_owned(),
+            message: e.to_string().into(),
+        };
+        if path.as_os_str() == "-" {
+            return Self::from_stream(io::stdin().lock(), "standard input");
+        }
+        let name = path.display().to_string();
+        let about = std::fs::metadata(path).map_err(io)?;
+        if about.is_dir() {
+            return Ok(Self {
+                name,
+                folder: Some(path.to_owned()),
+                data: Data::Memory(Cursor::default()),
+                len: folder_size(path).map_err(io)?,
+                format: Format::RosBag,
+                packed: Vec::new(),
+            });
+        }
+        let file = File::open(path).map_err(io)?;
+        if !about.is_file() {
+            return Self::from_stream(file, &name);
+        }
+        Self::identify(name, Data::File(BufReader::new(file)), about.len())
+    }
+
+    /// Takes bytes; `name` is what errors call them.
+    ///
+    /// # Errors
+    ///
+    /// As [`Input::open`].
+    pub fn from_bytes(bytes: Vec<u8>, name: &str) -> Result<Self, FormatError> {
+        let len = bytes.len() as u64;
+        Self::identify(name.to_owned(), Data::Memory(Cursor::new(bytes)), len)
+    }
+
+    /// Takes all that a stream gives, up to [`PIPE_MOST`].
+    ///
+    /// # Errors
+    ///
+    /// As [`Input::open`].
+    pub fn from_stream(stream: impl Read, name: &str) -> Result<Self, FormatError> {
+        let bytes = read_bounded(stream, PIPE_MOST, name)?;
+        Self::from_bytes(bytes, name)
+    }
+
+    fn identify(name: String, data: Data, len: u64) -> Result<Self, FormatError> {
+        let mut input = Self {
+            name,
+            folder: None,
+            data,
+            len,
+            format: Format::Text,
+            packed: Vec::new(),
+        };
+        loop {
+            let mut head = Vec::with_capacity(HEAD);
+            input.rewind()?;
+            let read = (&mut input).take(HEAD as u64).read_to_end(&mut head);
+            read.map_err(|e| input.io(&e))?;
+            if head.is_empty() {
+                return Err(FormatError::Empty {
+                    log: input.name.into(),
+                });
+            }
+            match detect(&head) {
+                Content::Log(format) => input.format = format,
+                Content::Zip => input.format = input.zip()?,
+                Content::NotRead(what, remedy) => {
+                    return Err(FormatError::NotRead {
+                        log: input.name.into(),
+                        what: what.into(),
+                        remedy: remedy.into(),
+                    });
+                }
+                wrapper => {
+                    input = input.unpack(wrapper == Content::Gzip)?;
+                    continue;
+                }
+            }
+            input.rewind()?;
+            return Ok(input);
+        }
+    }
+
+    fn unpack(mut self, gzip: bool) -> Result<Self, FormatError> {
+        let (what, format) = match gzip {
+            true => ("gzip", "packed by gzip"),
+            false => ("zstd", "packed by zstd"),
+        };
+        if self.packed.len() >= NESTED {
+            return Err(FormatError::NotRead {
+                log: self.name.into(),
+                what: "packed again and again".into(),
+                remedy: "unpack it".into(),
+            });
+        }
+        self.rewind()?;
+        let limit = UNPACK_LEAST.max(self.len.saturating_mul(UNPACK_FACTOR));
+        let name = self.name.clone();
+        let broken = |e: io::Error| FormatError::NotRead {
+            log: name.as_str().into(),
+            what: format.into(),
+            remedy: format!("and cannot be unpacked: {e}").into(),
+        };
+        let mut bytes = Vec::new();
+        let source = BufReader::new(&mut self);
+        let read = match gzip {
+            true => flate2::read::MultiGzDecoder::new(source)
+                .take(limit + 1)
+                .read_to_end(&mut bytes),
+            false => unpack_zstd(source, limit + 1, &mut bytes),
+        };
+        // What was unpacked before the cut is there; the reader finds that it ends too early.
+        match read {
+            Err(e) if e.kind() != io::ErrorKind::UnexpectedEof || bytes.is_empty() => {
+                return Err(broken(e));
+            }
+            _ => {}
+        }
+        if bytes.len() as u64 > limit {
+            return Err(too_large(&self.name, "the unpacked content", limit));
+        }
+        self.packed.push(what);
+        self.len = bytes.len() as u64;
+        self.data = Data::Memory(Cursor::new(bytes));
+        Ok(self)
+    }
+
+    /// A zip archive of NumPy arrays, or what else it is by the names of its entries.
+    fn zip(&mut self) -> Result<Format, FormatError> {
+        let name = self.name.clone();
+        let not_read = |what: &str, remedy: &str| FormatError::NotRead {
+            log: name.as_str().into(),
+            what: what.into(),
+            remedy: remedy.into(),
+        };
+        self.rewind()?;
+        let archive = zip::ZipArchive::new(&mut *self)
+            .map_err(|e| not_read("a zip archive", &format!("and is damaged: {e}")))?;
+        let names: Vec<String> = archive
+            .file_names()
+            .filter_map(|name| Some(name.ok()?.into_owned()))
+            .collect();
+        let any = |test: fn(&str) -> bool| names.iter().any(|n| test(n));
+        if any(|n| n.ends_with(".npy")) {
+            return Ok(Format::Npz);
+        }
+        if any(|n| n.starts_with("xl/")) {
+            return Err(not_read(
+                "an Excel workbook (XLSX)",
+                "save the sheet as CSV",
+            ));
+        }
+        if any(|n| n.starts_with("simulink/")) {
+            return Err(not_read(
+                "a Simulink model (SLX)",
+                "save the logged signals in a MAT file",
+            ));
+        }
+        Err(not_read("a zip archive", "unpack it"))
+    }
+
+    /// File name, or what else errors call it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Format of the unpacked content.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// Size of the unpacked content, bytes.
+    pub fn size(&self) -> u64 {
+        self.len
+    }
+
+    /// Wrappers that were taken off, the outermost first.
+    pub fn packed(&self) -> &[&'static str] {
+        &self.packed
+    }
+
+    /// The folder, where it is one.
+    pub fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
+    }
+
+    /// The whole content.
+    ///
+    /// # Errors
+    ///
+    /// [`FormatError::Io`].
+    pub fn into_bytes(self) -> Result<Vec<u8>, FormatError> {
+        match self.data {
+            Data::Memory(cursor) => Ok(cursor.into_inner()),
+            Data::File(_) => {
+                let mut input = self;
+                input.rewind()?;
+                let mut bytes = Vec::new();
+                let read = input.read_to_end(&mut bytes);
+                read.map_err(|e| input.io(&e))?;
+                Ok(bytes)
+            }
+        }
+    }
+
+    /// Goes to the beginning.
+    pub(crate) fn rewind(&mut self) -> Result<(), FormatError> {
+        let sought = self.seek(SeekFrom::Start(0));
+        sought.map(|_| ()).map_err(|e| self.io(&e))
+    }
+
+    /// An error of the operating system on this input.
+    pub(crate) fn io(&self, error: &io::Error) -> FormatError {
+        FormatError::Io {
+            path: self.name.clone().into(),
+            message: error.to_string().into(),
+        }
+    }
+}
+
+impl Read for Input {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match &mut self.data {
+            Data::Memory(data) => data.read(buffer),
+            Data::File(data) => data.read(buffer),
+        }
+    }
+}
+
+impl Seek for Input {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match &mut self.data {
+            Data::Memory(data) => data.seek(to),
+            Data::File(data) => data.seek(to),
+        }
+    }
+}
+
+/// Bytes of all files in a folder.
+fn folder_size(path: &Path) -> io::Result<u64> {
+    let mut sum = 0u64;
+    for entry in std::fs::read_dir(path)? {
+        let about = entry?.metadata()?;
+        sum = sum.saturating_add(if about.is_file() { about.len() } else { 0 });
+    }
+    Ok(sum)
+}
+
+fn read_bounded(stream: impl Read, limit: u64, name: &str) -> Result<Vec<u8>, FormatError> {
+    let mut bytes = Vec::new();
+    stream
+        .take(limit + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|e| FormatError::Io {
+            path: name.into(),
+            message: e.to_string().into(),
+        })?;
+    if bytes.len() as u64 > limit {
+        return Err(too_large(name, "a stream", limit));
+    }
+    Ok(bytes)
+}
+
+/// Frame after frame, as `zstd` itself reads a file.
+pub(crate) fn unpack_zstd(
+    mut source: impl BufRead,
+    limit: u64,
+    bytes: &mut Vec<u8>,
+) -> io::Result<usize> {
+    let before = bytes.len();
+    while !source.fill_buf()?.is_empty() {
+        let mut decoder = StreamingDecoder::new(&mut source).map_err(io::Error::other)?;
+        let room = limit.saturating_sub((bytes.len() - before) as u64);
+        (&mut decoder).take(room).read_to_end(bytes)?;
+        if (bytes.len() - before) as u64 >= limit {
+            break;
+        }
+    }
+    Ok(bytes.len() - before)
+}
+
+pub(crate) fn too_large(log: &str, what: &str, limit: u64) -> FormatError {
+    FormatError::TooLarge {
+        log: log.into(),
+        what: what.into(),
+        limit,
+    }
+}
