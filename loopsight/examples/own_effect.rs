@@ -47,7 +47,7 @@ const DRIVE: &str = "duration_s = 30.0\nperiod_s = 0.01\n[inputs]\n\
 
 fn main() -> loopsight::Result<()> {
     println!("{}", explain("cubic_damper")?.parts[0].equation);
-    let text = format!("{PLAIN}[[effect]]\n[effect.cubic_damper]\nat = [\"mass\"]\ncubic = 0.8\n");
+    let text = format!("{PLAIN}[[effect]]\n[effect.cubic_damper]\nat = [\"mass\"]\ncubic = 0.05\n");
     let robot = Session::of_model(Model::from_toml("robot.toml", &text)?);
     let drive = Experiment::from_toml("drive.toml", DRIVE)?;
     let made = robot.simulate(&SimulateOptions::new(drive))?;

@@ -290,3 +290,34 @@ fn progress_comes_in_stages_that_end() {
         ]
     );
 }
+
+/// Ctrl-C in the middle of long work: what was found is printed, and the exit status says that it is not all.
+#[test]
+#[cfg(unix)]
+fn ctrl_c_ends_a_diagnosis_with_what_was_found() {
+    use std::process::{Command, Stdio};
+    use std::time::Duration;
+
+    let folder = loopsight_tests::repository().join("examples/hidden-effect/coulomb_friction");
+    // How soon the work has begun depends on the machine; before that, the signal ends the process.
+    let cut = [200, 400, 800, 1600].into_iter().find_map(|wait| {
+        let child = Command::new(env!("CARGO_BIN_EXE_loopsight-under-test"))
+            .current_dir(&folder)
+            .args(["improve", "model.toml", "prbs.csv"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(wait));
+        let id = child.id().to_string();
+        let sent = Command::new("kill").args(["-INT", &id]).status().unwrap();
+        let output = child.wait_with_output().unwrap();
+        (sent.success() && output.status.code() == Some(1)).then_some(output)
+    });
+    let said = cut.unwrap();
+    let errors = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert!(
+        errors.contains("interrupted") || errors.contains("cancelled"),
+        "{errors}"
+    );
+}

@@ -8,7 +8,7 @@
 //! }
 //! ```
 //!
-//! Exit status: 0 done, 1 the work failed, 2 the request or a file is wrong.
+//! Exit status: 0 done, 1 the work failed or was interrupted, 2 the request or a file is wrong.
 
 mod arguments;
 mod commands;
@@ -42,6 +42,10 @@ pub fn run() -> ExitCode {
         }
     };
     match execute(&arguments) {
+        Ok(()) if interrupt::cut_work() => {
+            output::note("interrupted: this is what was found until then");
+            ExitCode::FAILURE
+        }
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             failure::print(&error);

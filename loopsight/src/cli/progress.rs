@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::cli::interrupt;
 use crate::watch::{Progress, Watch};
 use crate::words::percent;
 
@@ -19,10 +20,12 @@ impl Bar {
         Self(Arc::new(bar))
     }
 
-    /// What moves the bar.
+    /// What moves the bar; Ctrl-C stops what reports to it.
     pub(crate) fn watch(&self) -> Watch {
         let bar = Arc::clone(&self.0);
-        Watch::default().reporting(move |progress| show(&bar, progress))
+        Watch::default()
+            .reporting(move |progress| show(&bar, progress))
+            .stopped_by(&interrupt::token())
     }
 }
 
@@ -42,5 +45,6 @@ fn show(bar: &ProgressBar, progress: &Progress) {
 impl Drop for Bar {
     fn drop(&mut self) {
         self.0.finish_and_clear();
+        interrupt::work_ends();
     }
 }
