@@ -47,19 +47,56 @@ const COMMANDS: [&str; 3] = [
     "cargo run -- diagnose model.toml turns.csv --html why.html",
 ];
 
-/// The checkout that this command was built from.
+/// Where this command was built: a room of a checkout, or a folder of cargo's for what was published.
 const BUILT_FROM: &str = env!("CARGO_MANIFEST_DIR");
 
+/// Where a new crate takes loopsight from.
+enum Source {
+    /// A checkout of its repository.
+    Checkout(PathBuf),
+    /// The published version of this command.
+    Published,
+}
+
+impl Source {
+    /// A dependency on the crate in `room`, as a TOML value.
+    fn dependency(&self, room: &str) -> String {
+        match self {
+            Self::Checkout(checkout) => {
+                let path = checkout.join(room).display().to_string();
+                // A JSON string is a TOML string.
+                format!("{{ path = {} }}", serde_json::Value::from(path))
+            }
+            Self::Published => format!("\"{}\"", env!("CARGO_PKG_VERSION")),
+        }
+    }
+
+    fn note(&self) -> String {
+        match self {
+            Self::Checkout(path) => format!(
+                "loopsight is taken from {}; `--loopsight PATH` names another checkout",
+                path.display()
+            ),
+            Self::Published => format!(
+                "loopsight {} is taken from the registry; `--loopsight PATH` names a checkout",
+                env!("CARGO_PKG_VERSION")
+            ),
+        }
+    }
+}
+
 /// Makes the folder `target` for a crate that is built with the checkout `loopsight`, or else with the
-/// one that this program came from.
+/// one that this program came from, or else with what is published.
 pub(crate) fn workshop(target: &Path, loopsight: Option<&Path>) -> Result<Made> {
     let mut folder = Folder::new(target)?;
     check_name(folder.name())?;
-    let checkout = checkout(loopsight)?;
-    let manifest = manifest(folder.name(), &checkout);
+    let source = source(loopsight)?;
+    let manifest = manifest(folder.name(), &source);
     folder.write("Cargo.toml", &manifest)?;
-    // With the versions of everything that loopsight itself was tested with.
-    folder.write("Cargo.lock", &read_text(&checkout.join("Cargo.lock"))?)?;
+    if let Source::Checkout(checkout) = &source {
+        // With the versions of everything that loopsight itself was tested with.
+        folder.write("Cargo.lock", &read_text(&checkout.join("Cargo.lock"))?)?;
+    }
     folder.write("src/main.rs", MAIN)?;
     for (name, text) in FILES {
         folder.write(name, text)?;
@@ -69,10 +106,7 @@ pub(crate) fn workshop(target: &Path, loopsight: Option<&Path>) -> Result<Made> 
     folder.write(".gitignore", "/target\n")?;
     Ok(Made {
         written: folder.finish()?,
-        note: Some(format!(
-            "loopsight is taken from {}; `--loopsight PATH` names another checkout",
-            checkout.display()
-        )),
+        note: Some(source.note()),
         next: COMMANDS.map(str::to_owned).to_vec(),
     })
 }
@@ -120,12 +154,24 @@ fn check_name(name: &str) -> Result<()> {
     )))
 }
 
-/// The checkout to build with: the one that was named, or the one this command came from.
-fn checkout(named: Option<&Path>) -> Result<PathBuf> {
+/// What to build with: the checkout that was named, the one that this command came from, or what is published.
+fn source(named: Option<&Path>) -> Result<Source> {
     let path = match named {
         Some(path) => path.to_owned(),
         None => Path::new(BUILT_FROM).join(".."),
     };
+    match (checkout(&path), named) {
+        (Ok(checkout), _) => Ok(Source::Checkout(checkout)),
+        (Err(_), None) => Ok(Source::Published),
+        (Err(why), Some(path)) => Err(Error::request(format!(
+            "{} is no checkout of loopsight: {why}",
+            path.display()
+        ))),
+    }
+}
+
+/// The full path of a checkout, or what it lacks.
+fn checkout(path: &Path) -> std::result::Result<PathBuf, String> {
     let lacking = [
         "core/Cargo.toml",
         "model/Cargo.toml",
@@ -134,29 +180,13 @@ fn checkout(named: Option<&Path>) -> Result<PathBuf> {
     ]
     .into_iter()
     .find(|file| !path.join(file).is_file());
-    let found = match lacking {
+    match lacking {
         None => path.canonicalize().map_err(|e| e.to_string()),
         Some(file) => Err(format!("there is no {}", path.join(file).display())),
-    };
-    found.map_err(|why| {
-        Error::request(if named.is_some() {
-            format!("{} is no checkout of loopsight: {why}", path.display())
-        } else {
-            format!(
-                "the sources that this command was built from are gone ({why}), and the crates of \
-                 loopsight are not published: clone its repository and say where it is with \
-                 `--loopsight PATH`"
-            )
-        })
-    })
+    }
 }
 
-fn manifest(name: &str, checkout: &Path) -> String {
-    // A JSON string is a TOML string.
-    let path = |room: &str| {
-        let path = checkout.join(room).display().to_string();
-        serde_json::Value::from(path).to_string()
-    };
+fn manifest(name: &str, source: &Source) -> String {
     format!(
         r#"[package]
 name = "{name}"
@@ -166,11 +196,11 @@ publish = false
 
 [dependencies]
 # What the equations are written with.
-loopsight-core = {{ path = {} }}
+loopsight-core = {}
 # What makes them known to files and commands: the registry.
-loopsight-model = {{ path = {} }}
+loopsight-model = {}
 # The command `loopsight` with all that ships, for the parts of this crate to join.
-loopsight = {{ path = {} }}
+loopsight = {}
 
 # Not a member of a workspace that the folder may lie in.
 [workspace]
@@ -180,9 +210,9 @@ loopsight = {{ path = {} }}
 opt-level = 2
 debug = "line-tables-only"
 "#,
-        path("core"),
-        path("model"),
-        path("loopsight")
+        source.dependency("core"),
+        source.dependency("model"),
+        source.dependency("loopsight")
     )
 }
 
@@ -213,6 +243,14 @@ fn readme(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn without_a_checkout_the_published_version_is_taken() {
+        let text = manifest("ship", &Source::Published);
+        let read: toml::Table = text.parse().unwrap();
+        let version = read["dependencies"]["loopsight-model"].as_str();
+        assert_eq!(version, Some(env!("CARGO_PKG_VERSION")));
+    }
 
     #[test]
     fn names_that_cargo_refuses_are_refused_with_one_that_it_takes() {
