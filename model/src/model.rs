@@ -288,6 +288,10 @@ impl Model {
     }
 
     /// Parameters of the plant's equations from the model's values.
+    ///
+    /// # Panics
+    ///
+    /// When there are fewer values than the model has parameters.
     pub fn lower<S: HostReal>(&self, values: &[S]) -> Vec<S> {
         let mut p = vec![S::zero(); self.plant.parameters.len()];
         S::dynamics(self.dynamics).lower(self.set, &values[..self.n_plant_parameters], &mut p);
@@ -295,6 +299,10 @@ impl Model {
     }
 
     /// What follows from the plant's parameters at the model's values.
+    ///
+    /// # Panics
+    ///
+    /// When there are fewer values than the model has parameters.
     pub fn derived<S: HostReal>(&self, values: &[S]) -> Vec<(&'static Derived, S)> {
         let p = self.lower(values);
         let dynamics = S::dynamics(self.dynamics);
@@ -303,6 +311,10 @@ impl Model {
     }
 
     /// All signals (states, inputs, outputs) at a state and input, without effects.
+    ///
+    /// # Panics
+    ///
+    /// When `y` is shorter than states and inputs together, or one of `p`, `x`, `u` is shorter than the plant's.
     pub fn signals_at<S: HostReal>(&self, p: &[S], x: &[S], u: &[S], y: &mut [S]) {
         let (nx, nu) = (x.len(), u.len());
         y[..nx].copy_from_slice(x);

@@ -74,6 +74,10 @@ struct Scratch<S> {
 
 impl<S: HostReal> Simulator<'static, S> {
     /// As [`Simulator::new`], keeping the model: for a driver, which outlives who builds it.
+    ///
+    /// # Panics
+    ///
+    /// When there are fewer values than the model has parameters.
     pub fn owning(model: Model, values: &[S]) -> Self {
         Self::compose(Cow::Owned(model), values)
     }
@@ -81,6 +85,10 @@ impl<S: HostReal> Simulator<'static, S> {
 
 impl<'m, S: HostReal> Simulator<'m, S> {
     /// A simulator of `model` with the parameter `values` (as long as `model.parameters`), at rest.
+    ///
+    /// # Panics
+    ///
+    /// When there are fewer values than the model has parameters.
     pub fn new(model: &'m Model, values: &[S]) -> Self {
         Self::compose(Cow::Borrowed(model), values)
     }
@@ -254,6 +262,10 @@ impl<'m, S: HostReal> Simulator<'m, S> {
     }
 
     /// Integrates to `until` (s since the start of the run) with `input` applied from now on.
+    ///
+    /// # Panics
+    ///
+    /// When there are fewer inputs than the plant has.
     pub fn advance(&mut self, until: f64, input: &[f64]) {
         if !self.sensors.is_empty() {
             self.refresh();

@@ -10,6 +10,10 @@ use super::history::History;
 impl<S: HostReal> Simulator<'_, S> {
     /// As [`Simulator::advance`], where the input at `until` is `next`: inputs with a first-order
     /// hold run straight there, the others are held.
+    ///
+    /// # Panics
+    ///
+    /// When there are fewer inputs, now or next, than the plant has.
     pub fn advance_between(&mut self, until: f64, input: &[f64], next: &[f64]) {
         let span = until - self.time;
         if span > 0.0 {

@@ -12,6 +12,10 @@ const BEFORE: f64 = -1.0;
 impl<S: HostReal> Simulator<'_, S> {
     /// Starts a run at time 0 from the plant state `x0`. Before it `input` was applied, or nothing:
     /// whichever the machine is closer to rest with.
+    ///
+    /// # Panics
+    ///
+    /// When there are fewer states or inputs than the plant has.
     pub fn reset(&mut self, x0: &[S], input: &[f64]) {
         let nx = self.model.n_states();
         self.time = 0.0;
