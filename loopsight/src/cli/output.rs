@@ -4,7 +4,7 @@ use std::io::Write as _;
 
 use crate::answers::Answer;
 use crate::error::Result;
-pub(crate) use crate::words::report::{columns, table};
+pub(crate) use crate::words::report::columns;
 
 /// Something for the person at the terminal that is not the result: standard error.
 pub(crate) fn note(text: &str) {

@@ -1,17 +1,14 @@
 //! `loopsight experiment`.
 
-use crate::answers::ExperimentAnswer;
 use crate::cli::arguments::ExperimentArguments;
 use crate::cli::progress::Bar;
 use crate::cli::{files, output};
 use crate::error::Result;
+use crate::words::report;
 use crate::{Ask, ExperimentOptions, Model, Session};
 
 /// Stands for no second effect.
 const NOTHING: &str = "nothing";
-
-/// Experiments that are shown.
-const SHOWN: usize = 6;
 
 pub(crate) fn run(arguments: &ExperimentArguments) -> Result<()> {
     files::writable(&arguments.output)?;
@@ -29,7 +26,7 @@ pub(crate) fn run(arguments: &ExperimentArguments) -> Result<()> {
     if answer.answers() {
         answer.save(&arguments.output)?;
     }
-    output::answer(&answer, &text(&answer), arguments.json)?;
+    output::answer(&answer, &report::plan::text(&answer.engine), arguments.json)?;
     output::note(&if answer.answers() {
         format!(
             "wrote {}: {} samples over {} s; record it with the robot at rest and free to move",
@@ -50,27 +47,4 @@ fn ask(arguments: &ExperimentArguments) -> Ask {
         (_, Some(name)) => Ask::Pin(name.clone()),
         _ => Ask::All,
     }
-}
-
-fn text(answer: &ExperimentAnswer) -> String {
-    let mut text = answer.summary.clone();
-    if answer.answers() {
-        let rows: Vec<Vec<String>> = answer
-            .considered
-            .iter()
-            .take(SHOWN)
-            .map(|c| vec![c.experiment.clone(), format!("{:.1}", c.detectability)])
-            .collect();
-        let what = if answer.pins.is_empty() {
-            "standard deviations apart"
-        } else {
-            "value / std error"
-        };
-        text.push_str("\n\n");
-        text.push_str(&output::table(
-            &["experiments compared at one length", what],
-            &rows,
-        ));
-    }
-    text
 }
