@@ -15,7 +15,9 @@ use loopsight_drivers as _;
 use loopsight_model::config::TomlSource;
 use loopsight_model::loop_file::{Composed, LoopFile};
 use loopsight_model::model::Model;
-use loopsight_model::registry::{BuildError, DriverContext};
+use loopsight_model::registry::{BuildError, DriverContext, effects};
+use loopsight_onboard::{EffectSet, Parts, Twil, acts_aboard};
+use loopsight_plants as _;
 
 /// A robot at a socket: it hears `steps` steps, and then hangs up.
 fn robot(steps: usize) -> (PathBuf, JoinHandle<()>) {
@@ -199,4 +201,17 @@ fn mistakes_are_pointed_at() {
             .unwrap();
         assert!(said.contains(expected), "{said}");
     }
+}
+
+/// An effect of the library that can act aboard is compiled into the Twil's firmware, and no other is.
+#[test]
+fn the_firmware_lists_every_effect_that_can_act_aboard() {
+    type Aboard = <Twil as Parts>::Effects;
+    let (mut can, mut listed) = (Vec::new(), Vec::new());
+    for meta in effects() {
+        can.extend(acts_aboard(meta).then_some(meta.id));
+        listed.extend(Aboard::named(meta.id).map(|effect| effect.meta().id));
+    }
+    assert!(!can.is_empty());
+    assert_eq!(can, listed);
 }
