@@ -197,9 +197,8 @@ fn solve_plain(
     work: &Work<'_>,
 ) -> Result<(Plain, Losses), FitError> {
     let model = problem.model;
-    let start = problem.start(&FitSettings::default())?;
-    let start = problem.balance(start)?;
-    let solution = problem.finish(&start, FINAL)?;
+    let arrived = problem.arrive(&FitSettings::default(), FINAL)?;
+    let solution = problem.solution(&arrived.solution);
     let scaled = problem.pack(&solution.values, &solution.states);
     let cost = problem.residual_vector(&scaled)?.norm_squared();
     let judgement = holdout.judge(model, &solution, work)?;

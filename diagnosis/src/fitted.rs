@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use loopsight_model::model::Model;
 use serde::Serialize;
 
+use crate::arrive::Convergence;
 use crate::compare::Comparison;
 use crate::derived::derived;
 use crate::estimate::{Estimate, ParameterVerdict};
@@ -29,6 +30,10 @@ pub struct Fit {
     pub nrmse_fit: f64,
     /// Iterations (output error) or samples (recursive least squares).
     pub iterations: u64,
+    /// Whether the fit to the free run arrived, and from where; none for recursive least squares and for
+    /// one that was cancelled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub convergence: Option<Convergence>,
     /// Combinations of parameters that the data do not determine, in words.
     pub flat: Vec<String>,
     /// The work was cancelled: these are the best values found until then. Standard errors and errors by signal
@@ -69,6 +74,7 @@ impl Fit {
             nrmse_before: None,
             nrmse_fit: nrmse,
             iterations,
+            convergence: None,
             flat: Vec::new(),
             cancelled: true,
             model,

@@ -66,6 +66,7 @@
 //! as expressions in the model file count as well.
 
 mod advice;
+mod arrive;
 mod candidates;
 mod choose;
 mod compare;
@@ -78,6 +79,7 @@ mod error;
 mod estimate;
 mod experiment;
 mod explain;
+mod first;
 mod fit;
 mod fitted;
 mod flatness;
@@ -113,6 +115,7 @@ mod trial;
 mod where_it_fails;
 mod window;
 
+pub use arrive::{Convergence, Tried};
 pub use compare::{Comparison, RunTrace, SignalTrace, compare};
 pub use conclusion::{Advice, Conclusion, Diagnosis, EffectAt, Explanation, Level};
 pub use criteria::{Criteria, Criterion, Reason};

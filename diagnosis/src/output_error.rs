@@ -8,6 +8,7 @@ use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use crate::arrive::{Arrived, Convergence};
 use crate::compare::Comparison;
 use crate::derived::{Known, derived};
 use crate::error::FitError;
@@ -71,14 +72,20 @@ fn in_two_passes(problem: &mut Problem<'_>, settings: &FitSettings) -> Result<Fi
         iterations: settings.max_iterations,
         ..Effort::FULL
     };
-    let start = problem.start(settings)?;
-    let start = problem.balance(start)?;
-    let mut solution = problem.solve(&start, effort)?;
+    let Arrived {
+        mut solution,
+        mut settled,
+        tried,
+    } = problem.arrive(settings, effort)?;
     if let Some(start) = problem.whiten(&solution)? {
         let start = problem.balance(start)?;
-        solution = problem.solve(&start, effort)?;
+        (solution, settled) = problem.solve_and_tell(&start, effort)?;
     }
-    Ok(problem.result(&solution)?)
+    let mut fit = problem.result(&solution)?;
+    let hopeless = problem.work.criteria().start.hopeless;
+    let verdict = Convergence::of(fit.nrmse_fit, settled, tried, hopeless);
+    fit.convergence = Some(verdict);
+    Ok(fit)
 }
 
 /// A model and recordings that a fit can begin with.
@@ -119,6 +126,11 @@ pub(crate) fn prepare<'a>(
         return Ok(prepared);
     };
     let mut present = model.clone();
+    if let Some(values) = free_values(model, runs, settings, work)? {
+        present.set_values(&values);
+        prepared.model = Cow::Owned(present);
+        return Ok(prepared);
+    }
     for share in ROUNDS {
         let mut shortened = growth.clone();
         shortened.horizon *= share;
@@ -134,6 +146,31 @@ pub(crate) fn prepare<'a>(
     present.set_values(&values);
     prepared.model = Cow::Owned(present);
     Ok(prepared)
+}
+
+/// Values with which the model needs no observer, though with those it begins with it would: an arm on a
+/// spring of no stiffness falls, and one that hangs swings back. They are a fit's to the free run, where that
+/// leads to less than a part of what a constant leaves.
+fn free_values(
+    model: &Model,
+    runs: &[Run],
+    settings: &FitSettings,
+    work: &Work<'_>,
+) -> Result<Option<Vec<f64>>, Cancelled> {
+    let arrived = || -> Result<(f64, Vec<f64>), FitError> {
+        let mut problem = Problem::new(model, runs, work.silently())?;
+        let arrived = problem.arrive(settings, ROUND)?;
+        let error = problem.residual_vector(&arrived.solution)?.norm();
+        Ok((error, problem.solution(&arrived.solution).values))
+    };
+    let (error, values) = match arrived() {
+        Ok(found) => found,
+        Err(FitError::Cancelled(cancelled)) => return Err(cancelled),
+        Err(_) => return Ok(None),
+    };
+    let stands =
+        error < work.criteria().start.stands && growth(model, &values, runs, work)?.is_none();
+    Ok(stands.then_some(values))
 }
 
 /// The file's values, or those of a regression where it gives none; sizes of the declarations where
@@ -182,7 +219,11 @@ fn limit_rows(jacobian: &mut DMatrix<f64>, steep: f64) {
 impl Problem<'_> {
     /// The steepest row of the Jacobian over the one in the middle.
     pub(crate) fn steepness(&self, at: &DVector<f64>) -> Result<f64, Cancelled> {
-        let (norms, median) = row_norms(&self.linearise(at)?.1);
+        let (mut norms, median) = row_norms(&self.linearise(at)?.1);
+        // What counts more than others is not steeper.
+        for row in self.first_rows() {
+            norms[row] = 0.0;
+        }
         Ok(norms.into_iter().fold(0.0, f64::max) / median)
     }
 
@@ -274,6 +315,7 @@ impl Problem<'_> {
             nrmse_before: None,
             nrmse_fit: error,
             iterations: self.evaluations.get(),
+            convergence: None,
             flat: flatness.words,
             cancelled: false,
             model: fitted,

@@ -7,19 +7,15 @@ use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::FitError;
+use crate::first::first_weights;
 use crate::flatness::Named;
 use crate::noise::Block;
 use crate::positions::Positions;
 use crate::prediction::{
-    By, InitialStates, Solution, estimated_states, predict_with, residuals, sensitivities_with,
+    By, Solution, estimated_states, predict_with, residuals, sensitivities_with,
 };
 use crate::progress::{Cancelled, Work};
-use crate::regression::batch;
 use crate::score::Tally;
-use crate::settings::FitSettings;
-
-/// Spans of the regressions that a fit may start from, s.
-const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
 
 /// Unknowns, weighted residuals there, and their Jacobian.
 type Linearised = (DVector<f64>, DVector<f64>, DMatrix<f64>);
@@ -43,10 +39,12 @@ pub(crate) struct Problem<'a> {
     pub(crate) evaluations: Cell<u64>,
     pub(crate) cache: RefCell<Option<Linearised>>,
     pub(crate) samples: f64,
+    /// How many times as much the first sample of a run counts, by run and signal.
+    first: Vec<Vec<f64>>,
     /// Samples that the fit may see, by run; all where there is none.
     seen: Option<&'a [Vec<bool>]>,
     /// Initial states that are not estimated, by run.
-    known_states: Option<Vec<DVector<f64>>>,
+    pub(crate) known_states: Option<Vec<DVector<f64>>>,
     /// Where positions are measured and not simulated.
     pub(crate) positions: Option<Positions>,
     /// The best that was seen in the first pass, and the root of its cost.
@@ -96,7 +94,11 @@ impl<'a> Problem<'a> {
             .collect();
         let visible = match known_states {
             Some(_) => Vec::new(),
-            None => estimated_states(model, &nominal(model), runs),
+            None => estimated_states(model, &declared(model), runs),
+        };
+        let first = match known_states {
+            Some(_) => Vec::new(),
+            None => first_weights(model, runs, work.criteria()),
         };
         let mut scales = Vec::new();
         let mut lower = Vec::new();
@@ -132,48 +134,11 @@ impl<'a> Problem<'a> {
             evaluations: Cell::new(0),
             cache: RefCell::new(None),
             samples,
+            first,
             seen,
             known_states,
             positions: None,
             best: RefCell::new(None),
-        })
-    }
-
-    /// The file's values, and those of regressions; whichever runs closest to the data. Where there
-    /// is neither, the sizes of the declarations.
-    pub(crate) fn start(&self, settings: &FitSettings) -> Result<DVector<f64>, FitError> {
-        let mut candidates = Vec::new();
-        if self.model.missing_values().is_empty() {
-            candidates.push(self.model.values());
-        }
-        let mut failure = None;
-        for span in SPANS {
-            match batch(self.model, self.runs, settings.scheme, span, &self.work) {
-                Ok(values) => candidates.push(values),
-                Err(FitError::Cancelled(cancelled)) => return Err(cancelled.into()),
-                Err(error) => failure = Some(error),
-            }
-        }
-        if candidates.is_empty() {
-            match failure {
-                Some(FitError::NoRegression(_)) | None => candidates.push(declared(self.model)),
-                Some(error) => return Err(error),
-            }
-        }
-        let mut best: Option<(f64, DVector<f64>)> = None;
-        for values in candidates {
-            let initial = match &self.known_states {
-                Some(states) => states.clone(),
-                None => InitialStates::guess(self.model, &values, self.runs).states,
-            };
-            let scaled = self.pack(&values, &initial);
-            let cost = self.residual_vector(&scaled)?.norm_squared();
-            if cost.is_finite() && best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                best = Some((cost, scaled));
-            }
-        }
-        best.map(|(_, start)| start).ok_or_else(|| {
-            FitError::Solver("the free run diverges from every starting point".to_owned())
         })
     }
 
@@ -252,7 +217,23 @@ impl<'a> Problem<'a> {
         if self.seen.is_some_and(|seen| !seen[run][row / n_signals]) {
             return 0.0;
         }
-        self.weights[row % n_signals]
+        let weight = self.weights[row % n_signals];
+        match self.first.get(run) {
+            // The second pass weighs by the noise alone.
+            Some(first) if row < n_signals && self.rounding.is_empty() => weight * first[row],
+            _ => weight,
+        }
+    }
+
+    /// Rows of the first samples, which count more than others.
+    pub(crate) fn first_rows(&self) -> impl Iterator<Item = usize> + '_ {
+        let n_signals = self.weights.len();
+        let starts = self.runs.iter().scan(0, move |row, run| {
+            let first = *row;
+            *row += run.len() * n_signals;
+            Some(first..(first + n_signals).min(*row))
+        });
+        starts.flatten()
     }
 
     pub(crate) fn residual_vector(&self, scaled: &DVector<f64>) -> Result<DVector<f64>, Cancelled> {

@@ -60,8 +60,8 @@ pub(crate) fn for_each_row(
 
 /// Ordinary least squares over all samples: a starting point for a fit that needs one.
 ///
-/// Parameters that are free but enter non-linearly keep the model's value; values that the samples
-/// do not determine are those of least norm. For `span` see [`for_each_row`].
+/// Parameters that are free but enter non-linearly keep the model's value, or have the size of their
+/// declaration; values that the samples do not determine are those of least norm. For `span` see [`for_each_row`].
 pub(crate) fn batch(
     model: &Model,
     runs: &[Run],
@@ -71,7 +71,9 @@ pub(crate) fn batch(
 ) -> Result<Vec<f64>, FitError> {
     let mut linear = model.clone();
     for parameter in &mut linear.parameters {
-        if !parameter.declaration.linear && parameter.value.is_some() {
+        if parameter.free && !parameter.declaration.linear {
+            let size = parameter.declaration.nearest(parameter.scale());
+            parameter.value = parameter.value.or(Some(size));
             parameter.free = false;
         }
     }

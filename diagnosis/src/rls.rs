@@ -133,6 +133,7 @@ pub(crate) fn fit(
         nrmse_before: None,
         nrmse_fit: f64::NAN,
         iterations: samples,
+        convergence: None,
         flat: Vec::new(),
         cancelled: done.is_err(),
         model: fitted,

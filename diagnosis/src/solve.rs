@@ -2,7 +2,7 @@
 
 use basin::{
     BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet,
-    ConstraintSolveError, Constraints, Executor, Jacobian, Residual,
+    ConstraintSolveError, Constraints, Executor, Jacobian, Residual, Termination,
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -56,6 +56,15 @@ impl Problem<'_> {
         start: &DVector<f64>,
         effort: Effort,
     ) -> Result<DVector<f64>, FitError> {
+        Ok(self.solve_and_tell(start, effort)?.0)
+    }
+
+    /// As [`Problem::solve`], and whether the cost had ceased to fall before the iterations ended.
+    pub(crate) fn solve_and_tell(
+        &self,
+        start: &DVector<f64>,
+        effort: Effort,
+    ) -> Result<(DVector<f64>, bool), FitError> {
         let solver = BoundedLevenbergMarquardt::<DVector<f64>, DMatrix<f64>>::new()
             .with_absolute_scaled_gradient_tolerance(1e-14)
             .with_tau(1e-6)
@@ -75,7 +84,8 @@ impl Problem<'_> {
                 "the parameters left the finite numbers".to_owned(),
             ));
         }
-        Ok(solution)
+        let settled = !matches!(result.report.termination, Termination::Limit(_));
+        Ok((solution, settled))
     }
 }
 

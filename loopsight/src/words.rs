@@ -18,6 +18,11 @@ pub(crate) fn fit(fit: &Fit) -> String {
     report::fit::summary(fit).join(" ")
 }
 
+/// That a fit did not converge, and why; none where it did.
+pub(crate) fn not_converged(fit: &Fit) -> Option<String> {
+    report::fit::not_converged(fit)
+}
+
 /// The conclusion of a diagnosis.
 pub(crate) fn diagnosis(diagnosis: &Diagnosis) -> String {
     report::diagnosis::summary(diagnosis).join(" ")

@@ -192,7 +192,7 @@ impl Real for Dual {
     }
     fn sqrt(self) -> Self {
         let sqrt = libm::sqrt(self.value);
-        self.chain(sqrt, 0.5 / sqrt)
+        self.chain(sqrt, steep(0.5 / sqrt))
     }
     fn ln(self) -> Self {
         self.chain(libm::log(self.value), 1.0 / self.value)
@@ -212,7 +212,7 @@ impl Real for Dual {
     fn powf(self, exponent: Self) -> Self {
         let (base, power) = (self.value, exponent.value);
         let value = libm::pow(base, power);
-        let by_base = power * libm::pow(base, power - 1.0);
+        let by_base = steep(power * libm::pow(base, power - 1.0));
         // At or below zero there is a power only where the exponent stays a whole number.
         let by_power = if base > 0.0 {
             value * libm::log(base)
@@ -225,6 +225,14 @@ impl Real for Dual {
         }
         Self { value, slopes }
     }
+}
+
+/// A slope, or none where it is vertical: at zero a root and a power below 1 rise without bound, and
+/// infinity times the zero slope of a constant is no number. The value is right all the same, and so is
+/// the derivative by everything else (of an exponent, say).
+#[inline(always)]
+fn steep(slope: f64) -> f64 {
+    if slope.is_infinite() { 0.0 } else { slope }
 }
 
 #[cfg(test)]
@@ -267,6 +275,15 @@ mod tests {
         assert_eq!(Real::abs(x).value(), 2.0);
         assert_eq!(derivative(&Real::abs(x), 3), -1.0);
         assert_eq!(derivative(&x.clamp(Dual::of(-1.0), Dual::of(1.0)), 3), 0.0);
+    }
+
+    /// An input at 0 V to the power of a parameter below 1: the input is a constant, the power is not.
+    #[test]
+    fn a_power_at_zero_has_a_derivative() {
+        let power = Dual::of(0.0).powf(variable(0.5, 0));
+        assert_eq!((power.value(), derivative(&power, 0)), (0.0, 0.0));
+        let root = Real::sqrt(variable(0.0, 0) * Dual::of(0.0));
+        assert_eq!((root.value(), derivative(&root, 0)), (0.0, 0.0));
     }
 
     #[test]

@@ -42,6 +42,8 @@ pub struct Model {
     pub log: LogMap,
     /// Longest integration step, s.
     pub max_step: f64,
+    /// The file gives it: then no step is longer, however far apart the samples are.
+    pub step_given: bool,
     pub(crate) dynamics: &'static dyn AnyDynamics,
     pub(crate) set: usize,
     pub(crate) n_plant_parameters: usize,
@@ -143,6 +145,7 @@ impl Model {
             measured: Vec::new(),
             log: file.log.clone(),
             max_step: step,
+            step_given: file.simulation.max_step_s.is_some(),
             dynamics: ready.dynamics,
             set: values.set,
             n_plant_parameters,

@@ -8,6 +8,11 @@ use crate::registry::HostReal;
 use crate::{DUAL_WIDTH, Dual, derivative, variable};
 use loopsight_core::Real;
 
+/// The `i`-th coordinate of a place away from the origin, none like another.
+fn away(i: usize) -> f64 {
+    0.5 + 0.1 * (i as f64 + 1.0).sqrt()
+}
+
 impl Model {
     /// Sensitivity of the measured signals to the plant state (measured × states) at `x`, and
     /// their values there.
@@ -40,12 +45,38 @@ impl Model {
         (jacobian, value)
     }
 
-    /// Plant states that a measured signal or its rate is a function of, near the origin: those whose
-    /// initial values show at the beginning of a run. A position that is measured shows its
-    /// velocity, too.
+    /// Plant states that what is measured depends on, by way of however many other states: those whose
+    /// initial values show in a run. A position that is measured shows its velocity, a temperature the
+    /// heater behind it.
+    ///
+    /// What depends on what is read off the derivatives at the origin and at a place away from it, where
+    /// `speed·abs(speed)` has one, too.
     pub fn seen_states(&self, values: &[f64]) -> Vec<usize> {
+        let nx = self.n_states();
+        let mut seen = vec![false; nx];
+        let mut by_rate = vec![vec![false; nx]; nx];
+        for x in [vec![0.0; nx], (0..nx).map(away).collect()] {
+            let (of_state, _) = self.measurement_jacobian(values, &x);
+            let rates = self.rate_jacobian(values, &x);
+            for i in 0..nx {
+                seen[i] |= of_state.column(i).iter().any(|v| *v != 0.0);
+                for (row, of_row) in by_rate.iter_mut().enumerate() {
+                    of_row[i] |= rates[(row, i)] != 0.0;
+                }
+            }
+        }
+        // A chain of states is no longer than there are states.
+        for _ in 0..nx {
+            for i in 0..nx {
+                seen[i] |= (0..nx).any(|row| seen[row] && by_rate[row][i]);
+            }
+        }
+        (0..nx).filter(|i| seen[*i]).collect()
+    }
+
+    /// Sensitivity of the states' rates to the states at `x`, without inputs and efforts.
+    fn rate_jacobian(&self, values: &[f64], x: &[f64]) -> DMatrix<f64> {
         let (nx, nu) = (self.n_states(), self.plant.inputs.len());
-        let (of_state, _) = self.measurement_jacobian(values, &vec![0.0; nx]);
         let p: Vec<Dual> = self.lower(&values.iter().map(|v| Dual::of(*v)).collect::<Vec<_>>());
         let (u, w) = (
             vec![Dual::of(0.0); nu],
@@ -53,19 +84,15 @@ impl Model {
         );
         let mut rates = DMatrix::zeros(nx, nx);
         for column in 0..nx {
-            let mut x = vec![Dual::of(0.0); nx];
-            x[column] = variable(0.0, 0);
+            let mut seeded: Vec<Dual> = x.iter().map(|v| Dual::of(*v)).collect();
+            seeded[column] = variable(x[column], 0);
             let mut dx = vec![Dual::of(0.0); nx];
-            Dual::dynamics(self.dynamics).derivative(&x, &u, &w, &p, &mut dx);
+            Dual::dynamics(self.dynamics).derivative(&seeded, &u, &w, &p, &mut dx);
             for (row, rate) in dx.iter().enumerate() {
                 rates[(row, column)] = derivative(rate, 0);
             }
         }
-        let of_rate = &of_state * rates;
-        let shows = |m: &DMatrix<f64>, i: usize| m.column(i).iter().any(|v| *v != 0.0);
-        (0..nx)
-            .filter(|i| shows(&of_state, *i) || shows(&of_rate, *i))
-            .collect()
+        rates
     }
 
     /// The state of least norm that explains the measurement `y` (NaN entries are left out):

@@ -4,6 +4,7 @@
 mod drive;
 mod rate;
 mod sign;
+mod spikes;
 mod still;
 mod stuck;
 
@@ -13,6 +14,7 @@ use crate::fault::{Fault, FaultKind};
 use crate::map::Recording;
 use crate::plan::Plan;
 use crate::table::Table;
+pub(crate) use spikes::take_out as take_out_spikes;
 
 /// All checks, on the mapped recording and on the columns of the file.
 pub(crate) fn check(

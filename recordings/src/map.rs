@@ -83,6 +83,8 @@ pub fn map(
         found.extend(log.notes());
     }
     found.extend(plan.notes.iter().cloned());
+    let measured_ids: Vec<&str> = plan.measured.iter().map(|(_, m)| m.id.as_str()).collect();
+    found.extend(faults::take_out_spikes(&mut recording, &measured_ids));
     let input_ids: Vec<&str> = plan.inputs.iter().map(|(_, id)| id.as_str()).collect();
     found.extend(faults::check(&recording, &input_ids, &table, &plan));
     found.sort_by_key(|fault| std::cmp::Reverse(fault.severity()));

@@ -133,6 +133,7 @@ pub(crate) fn fit() -> Fit {
         nrmse_fit: 0.02,
         iterations: 3,
         cancelled: false,
+        convergence: None,
         flat: vec![],
         model: model(1),
         history: vec![],

@@ -245,6 +245,7 @@ pub(crate) mod tests {
             nrmse_before: Some(0.21),
             nrmse_fit: 0.052,
             iterations: 12,
+            convergence: None,
             flat: vec!["K_E + 0.3·K_B".to_owned()],
             ..crate::findings::fit()
         };

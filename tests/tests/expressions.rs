@@ -14,6 +14,7 @@ use loopsight_model::excitation::{Excitation, build, sample_rows};
 use loopsight_model::model::Model;
 use loopsight_model::registry::plants;
 use loopsight_model::run::Run;
+use loopsight_model::simulate::Simulator;
 use loopsight_tests::{instants, repository, unknown};
 
 /// An axis with two states, a quadratic drag of its own, and a tachometer.
@@ -131,4 +132,40 @@ fn what_is_documented_works() {
     let pendulum = model(blocks[1]);
     assert_eq!(pendulum.parameters.len(), 4);
     assert!(pendulum.affine().is_some());
+}
+
+/// Two bodies of 2 s and 200 s, read every 5 s.
+const OVEN: &str = "[plant.expression.states]\n\
+    element = { unit = \"1\", rate = \"0.5 * (heater - element)\" }\n\
+    body = { unit = \"1\", rate = \"0.005 * (element - body)\" }\n\
+    [plant.expression.inputs]\nheater = { unit = \"1\" }\n[log.measured.body]\n";
+
+fn oven(text: &str) -> Vec<f64> {
+    let (model, _) = Model::from_toml("oven.toml", text).unwrap();
+    let mut simulator = Simulator::new(&model, &model.values());
+    let mut body = Vec::new();
+    for k in 0..200_u32 {
+        let heater = if k / 40 % 2 == 0 { 1.0 } else { 0.2 };
+        simulator.advance(5.0 * f64::from(k + 1), &[heater]);
+        body.push(simulator.state()[1]);
+    }
+    body
+}
+
+#[test]
+fn long_steps_come_to_the_same_place() {
+    let given = oven(&format!("{OVEN}[simulation]\nmax_step_s = 0.0025\n"));
+    let chosen = oven(OVEN);
+    let off = given.iter().zip(&chosen).map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f64::max) < 2e-5);
+    // They are not the short ones.
+    assert!(given.iter().zip(&chosen).any(|(a, b)| a != b));
+}
+
+#[test]
+fn a_stiff_model_takes_as_short_steps_as_it_needs() {
+    // 2 ms beside 5 s between samples: longer steps would be unstable.
+    let stiff = OVEN.replace("0.5 * (heater", "500.0 * (heater");
+    let body = oven(&stiff);
+    assert!(body.iter().all(|v| (0.0..=1.0).contains(v)), "{body:?}");
 }

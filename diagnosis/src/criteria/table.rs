@@ -27,6 +27,24 @@ criteria! {
         starts_share: f64 = 0.5 "1", Judgement: "a majority";
     }
 
+    /// From where a fit begins, and whether it arrived.
+    start: StartCriteria {
+        /// Share of a signal's deviation that a model is commonly wrong by: what a start is known to is weighed against it.
+        wrong: f64 = 0.1 "1", Judgement: "a model worth to be improved leaves about a tenth";
+        /// Most that the first sample of a run may count, in samples.
+        most: f64 = 100.0 "1", Judgement: "beyond it a start is as good as given";
+        /// Error of a fit above which other starts are tried as well.
+        poor: f64 = 0.1 "1", Judgement: "a fit that leaves less has arrived, whatever is missing";
+        /// Error above which seeded random starts are among them.
+        lost: f64 = 0.3 "1", Judgement: "missing physics leaves seldom more of a fit that arrived";
+        /// Ratio of errors below which another start led further.
+        further: f64 = 0.98 "1", Judgement: "two per cent: less is another way to the same place";
+        /// Error below which a fit without an observer says that none is needed.
+        stands: f64 = 0.6 "1", Judgement: "more than half of the signal is followed from its inputs alone";
+        /// Error from which nothing was fitted: the model leaves as much as a constant would.
+        hopeless: f64 = 1.0 "1", Derived: "the mean of the signal leaves 1";
+    }
+
     /// What is said of a fitted parameter.
     parameters: ParameterCriteria {
         /// Quantile of the intervals.

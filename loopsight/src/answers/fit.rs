@@ -7,6 +7,7 @@ use super::Answer;
 use super::common::{Estimates, ModelErrors, estimates};
 use super::series::{Series, SeriesOf, series};
 use crate::about::About;
+use crate::error::{Error, Result};
 use crate::fit::Method;
 use crate::model::Model;
 use crate::words;
@@ -36,6 +37,9 @@ pub struct FitAnswer {
     pub nrmse_fit: f64,
     /// Iterations (output error) or samples (recursive least squares).
     pub iterations: u64,
+    /// Whether the fit to the free run arrived, and from where; absent for recursive least squares.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub convergence: Option<Convergence>,
     /// Combinations of parameters that the data do not determine, in words.
     pub flat: Vec<String>,
     /// The fit was cancelled: these are the best values found until then, without errors.
@@ -56,6 +60,48 @@ pub struct FitAnswer {
     model: Model,
 }
 
+/// Whether a fit arrived.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub struct Convergence {
+    /// The error falls no further, and the model leaves less than a constant would.
+    pub converged: bool,
+    /// Why not; absent where it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// The starts that were tried, the one that promised most first.
+    pub starts: Vec<Start>,
+}
+
+/// A start of a fit.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub struct Start {
+    /// What it was made of.
+    pub from: String,
+    /// Free-run error relative to the standard deviation where it ended.
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
+    pub nrmse: f64,
+}
+
+impl From<loopsight_diagnosis::Convergence> for Convergence {
+    fn from(of: loopsight_diagnosis::Convergence) -> Self {
+        let starts = of.starts.into_iter();
+        Self {
+            converged: of.converged,
+            reason: of.reason,
+            starts: starts
+                .map(|tried| Start {
+                    from: tried.from,
+                    nrmse: tried.nrmse,
+                })
+                .collect(),
+        }
+    }
+}
+
 impl Answer for FitAnswer {
     const SCHEMA: &'static str = "loopsight/fit/1";
 }
@@ -71,6 +117,7 @@ impl FitAnswer {
             nrmse_before: engine.nrmse_before,
             nrmse_fit: engine.nrmse_fit,
             iterations: engine.iterations,
+            convergence: engine.convergence.clone().map(Convergence::from),
             flat: engine.flat.clone(),
             cancelled: engine.cancelled,
             summary: words::fit(&engine),
@@ -78,6 +125,19 @@ impl FitAnswer {
             about,
             engine,
             model,
+        }
+    }
+
+    /// Whether the fit arrived: an error says why it did not, and what was tried.
+    ///
+    /// # Errors
+    ///
+    /// The model leaves as much as a constant would from every start, or the error was still falling at the
+    /// last iteration.
+    pub fn arrived(&self) -> Result<()> {
+        match words::not_converged(&self.engine) {
+            Some(why) => Err(Error::work(why)),
+            None => Ok(()),
         }
     }
 

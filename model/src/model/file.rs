@@ -32,7 +32,9 @@ pub struct ModelFile {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SimulationOptions {
-    /// Longest integration step, s; by default the plant's own ([`Plant::MAX_STEP_S`](loopsight_core::Plant::MAX_STEP_S)).
+    /// Longest integration step, s; by default the plant's own
+    /// ([`Plant::MAX_STEP_S`](loopsight_core::Plant::MAX_STEP_S)), or longer where samples are far apart and
+    /// steps of half the length come to the same place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_step_s: Option<f64>,
 }

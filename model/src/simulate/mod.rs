@@ -3,6 +3,7 @@
 pub(crate) mod bound;
 mod follow;
 pub(crate) mod history;
+mod lengthen;
 mod observer;
 mod push;
 mod ramp;
@@ -21,6 +22,7 @@ use loopsight_core::{NoPast, Place, Rk4, substeps};
 use bound::{Bounds, Scene};
 pub use follow::{follow, free_run, try_follow};
 use history::{Between, History};
+use lengthen::Lengthened;
 use push::Pushed;
 use ramp::{hold_means, ramped};
 use sensing::{Integral, Sensing, sense};
@@ -56,6 +58,9 @@ pub struct Simulator<'m, S> {
     interval: f64,
     /// Longest integration step, s.
     longest: f64,
+    /// Steps longer than that where the samples are far apart and the motion allows them; none where the
+    /// file gives the step, or a past must be written down step by step.
+    lengthened: Option<Lengthened<S>>,
     /// How fast each input changes within the interval that is integrated, per second.
     slopes: Vec<f64>,
     /// Inputs that run on straight lines between samples.
@@ -129,6 +134,8 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                 })
             })
             .collect();
+        let lengthened =
+            (!model.step_given && bounds.output_memory.is_empty()).then(|| Lengthened::new(size));
         let mut simulator = Self {
             p: model.lower(values),
             values: values.to_vec(),
@@ -150,6 +157,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             time: 0.0,
             interval: 0.0,
             longest: model.step(),
+            lengthened,
             slopes: vec![0.0; nu],
             ramped: (0..nu)
                 .filter(|i| model.hold(*i) == Hold::FirstOrder)
@@ -279,8 +287,19 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             }
         }
         let span = until - self.time;
-        let start = self.time;
         let steps = substeps(span, self.longest);
+        if self.lengthens(steps) {
+            self.advance_lengthened(input, span, steps);
+        } else {
+            self.integrate(input, span, steps);
+        }
+        self.time = until;
+        self.interval = span;
+    }
+
+    /// Integrates over `span` in so many equal `steps`.
+    fn integrate(&mut self, input: &[f64], span: f64, steps: usize) {
+        let start = self.time;
         let h = span / steps as f64;
         for step in 0..steps {
             let elapsed = h * step as f64;
@@ -292,8 +311,6 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                 self.remember();
             }
         }
-        self.time = until;
-        self.interval = span;
     }
 
     /// One integration step, from the inputs in `held`; leaves those at its end there.

@@ -29,9 +29,24 @@ pub fn summary(fit: &Fit) -> Vec<String> {
     said
 }
 
+/// That a fit did not converge, why, and what was tried; none where it did.
+pub fn not_converged(fit: &Fit) -> Option<String> {
+    let convergence = fit.convergence.as_ref()?;
+    let reason = convergence.reason.as_ref()?;
+    let starts = convergence.starts.iter();
+    let tried: Vec<String> = starts
+        .map(|start| format!("{} ({})", start.from, error(start.nrmse)))
+        .collect();
+    Some(format!(
+        "the fit did not converge: {reason}; tried: {}",
+        tried.join(", ")
+    ))
+}
+
 /// How the error fell, and what it is on a test log where there is one.
 pub(crate) fn how_it_went(fit: &Fit) -> Vec<String> {
     let mut said = vec![error_fell(fit)];
+    said.extend(not_converged(fit).map(|why| sentence(&why)));
     let (fitted, judged) = (fit.nrmse_fit, fit.comparison.nrmse);
     if judged.is_finite() && (judged - fitted).abs() > 1e-9 * fitted {
         said.push(format!(
@@ -40,6 +55,13 @@ pub(crate) fn how_it_went(fit: &Fit) -> Vec<String> {
         ));
     }
     said
+}
+
+/// Words as a sentence.
+fn sentence(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
 }
 
 /// How the error on the fitted log fell.
@@ -135,7 +157,7 @@ fn estimates(head: &str, estimates: &BTreeMap<String, Estimate>) -> String {
 mod tests {
     use super::*;
     use crate::findings::improvement;
-    use loopsight_diagnosis::Conclusion;
+    use loopsight_diagnosis::{Conclusion, Convergence, Tried};
 
     #[test]
     fn the_summary_says_what_is_not_pinned() {
@@ -153,6 +175,19 @@ mod tests {
                 "Not determined by these data: K_E + 0.3·K_B.",
             ]
         );
+        fit.convergence = Some(Convergence {
+            converged: false,
+            reason: Some("the error was still falling at the last iteration".into()),
+            starts: vec![Tried {
+                from: "the file's values".into(),
+                nrmse: 0.4,
+            }],
+        });
+        assert_eq!(
+            summary(&fit)[1],
+            "The fit did not converge: the error was still falling at the last iteration; tried: the file's values (40.0 %)."
+        );
+        fit.convergence = None;
         fit.nrmse_before = Some(0.01);
         assert!(summary(&fit)[0].contains("rose from 1.00 % to 2.00 %"));
         fit.nrmse_before = Some(0.020_000_1);

@@ -39,5 +39,5 @@ pub(crate) fn run(arguments: &FitArguments) -> Result<()> {
     if let Some(path) = &arguments.html {
         files::save(path, &answer.page(&output::command_line()))?;
     }
-    Ok(())
+    answer.arrived()
 }

@@ -1,0 +1,316 @@
+//! A fit that arrives: from several starts, and a verdict on where it came to.
+
+use serde::Serialize;
+
+use loopsight_model::model::ModelParameter;
+use nalgebra::DVector;
+
+use crate::error::FitError;
+use crate::prediction::{InitialStates, Solution};
+use crate::problem::{Problem, declared};
+use crate::regression::batch;
+use crate::settings::FitSettings;
+use crate::solve::Effort;
+
+/// Spans of the regressions that a fit may start from, s.
+const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
+/// Scattered starts.
+const SCATTERED: usize = 8;
+/// Scattered starts reach so many decades to either side of a value without a range.
+const DECADES: f64 = 1.5;
+/// Other starts that are tried, the best first.
+const OTHERS: usize = 6;
+/// Effort of a start that is tried beside the first.
+const SHORT: Effort = Effort {
+    iterations: 12,
+    tolerance: 1e-4,
+};
+
+/// Where a fit began, and what it left.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Tried {
+    /// What the start was made of.
+    pub from: String,
+    /// Free-run error relative to the standard deviation where it ended.
+    pub nrmse: f64,
+}
+
+/// Whether a fit arrived.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Convergence {
+    /// The error falls no further, and the model leaves less than a constant would.
+    pub converged: bool,
+    /// Why not, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// The starts that were tried; the first is the one that promised most.
+    pub starts: Vec<Tried>,
+}
+
+/// Where a problem's solution lies, and how it was found.
+pub(crate) struct Arrived {
+    /// Scaled unknowns.
+    pub(crate) solution: DVector<f64>,
+    pub(crate) settled: bool,
+    pub(crate) tried: Vec<Tried>,
+}
+
+/// Values to begin with.
+struct Start {
+    from: String,
+    values: Vec<f64>,
+    states: Vec<DVector<f64>>,
+    cost: f64,
+}
+
+/// A start that was followed.
+struct Attempt {
+    solution: Solution,
+    error: f64,
+    settled: bool,
+}
+
+impl Convergence {
+    /// The verdict on a fit that left `nrmse`, and whether its error had `settled`.
+    pub(crate) fn of(nrmse: f64, settled: bool, starts: Vec<Tried>, hopeless: f64) -> Self {
+        let reason = if nrmse.is_nan() || nrmse >= hopeless {
+            Some("the fitted model leaves as much as a constant would, or more".to_owned())
+        } else if !settled {
+            Some("the error was still falling at the last iteration".to_owned())
+        } else {
+            None
+        };
+        Self {
+            converged: reason.is_none(),
+            reason,
+            starts,
+        }
+    }
+}
+
+impl Problem<'_> {
+    /// Solves from the start that promises most: the file's values, or those of a regression over one of
+    /// several spans. Where that leads to a poor place others are tried, scattered ones among them where
+    /// it is hopeless; the one that led furthest is followed to the end.
+    pub(crate) fn arrive(
+        &mut self,
+        settings: &FitSettings,
+        effort: Effort,
+    ) -> Result<Arrived, FitError> {
+        let criteria = self.work.criteria().start;
+        let mut starts = self.starts(settings)?;
+        let mut tried = Vec::new();
+        let mut best = None;
+        // The first that can be followed at all.
+        while best.is_none() && !starts.is_empty() {
+            let start = starts.remove(0);
+            best = self.attempt(&start, effort, &mut tried)?;
+        }
+        let Some(mut best) = best else {
+            return Err(FitError::Solver(
+                "the free run diverges from every starting point".to_owned(),
+            ));
+        };
+        if best.error > criteria.poor {
+            starts.truncate(OTHERS);
+            if best.error > criteria.lost {
+                starts.extend(self.scattered(&best.solution.values)?);
+            }
+            let mut furthest: Option<Attempt> = None;
+            for start in &starts {
+                let Some(other) = self.attempt(start, SHORT, &mut tried)? else {
+                    continue;
+                };
+                if furthest.as_ref().is_none_or(|f| other.error < f.error) {
+                    furthest = Some(other);
+                }
+            }
+            if let Some(other) = furthest.filter(|f| f.error < criteria.further * best.error) {
+                let Solution { values, states } = &other.solution;
+                let further = self.follow(values, states, effort)?;
+                best = if further.error < other.error {
+                    further
+                } else {
+                    other
+                };
+            }
+        }
+        let Solution { values, states } = &best.solution;
+        let scaled = self.pack(values, states);
+        Ok(Arrived {
+            solution: self.balance(scaled)?,
+            settled: best.settled,
+            tried,
+        })
+    }
+
+    /// Follows a start, and notes where it led; none where the solver gives up.
+    fn attempt(
+        &mut self,
+        start: &Start,
+        effort: Effort,
+        tried: &mut Vec<Tried>,
+    ) -> Result<Option<Attempt>, FitError> {
+        let attempt = match self.follow(&start.values, &start.states, effort) {
+            Ok(attempt) => attempt,
+            Err(FitError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(_) => return Ok(None),
+        };
+        tried.push(Tried {
+            from: start.from.clone(),
+            nrmse: attempt.error,
+        });
+        Ok(attempt.error.is_finite().then_some(attempt))
+    }
+
+    fn follow(
+        &mut self,
+        values: &[f64],
+        states: &[DVector<f64>],
+        effort: Effort,
+    ) -> Result<Attempt, FitError> {
+        let start = self.pack(values, states);
+        let start = self.balance(start)?;
+        let (scaled, settled) = self.solve_and_tell(&start, effort)?;
+        let error = self.residual_vector(&scaled)?.norm();
+        Ok(Attempt {
+            solution: self.solution(&scaled),
+            error,
+            settled,
+        })
+    }
+
+    /// The file's values and those of regressions, whichever runs closest to the data first. Where there
+    /// is neither, the sizes of the declarations.
+    fn starts(&self, settings: &FitSettings) -> Result<Vec<Start>, FitError> {
+        let mut starts = Vec::new();
+        if self.model.missing_values().is_empty() {
+            starts.extend(self.start("the file's values", self.model.values())?);
+        }
+        let mut failure = None;
+        for span in SPANS {
+            match batch(self.model, self.runs, settings.scheme, span, &self.work) {
+                Ok(values) => {
+                    let from = format!("a regression over spans of {span} s");
+                    starts.extend(self.start(&from, values)?);
+                }
+                Err(FitError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                Err(error) => failure = Some(error),
+            }
+        }
+        if starts.is_empty() {
+            match failure {
+                Some(FitError::NoRegression(_)) | None => {}
+                Some(error) => return Err(error),
+            }
+        }
+        if !self.model.missing_values().is_empty() || starts.is_empty() {
+            let from = "the sizes of the declarations";
+            starts.extend(self.start(from, declared(self.model))?);
+        }
+        starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        if starts.is_empty() {
+            return self.scattered(&declared(self.model));
+        }
+        Ok(starts)
+    }
+
+    /// A start with the initial states that its values suggest; none where its free run diverges.
+    fn start(&self, from: &str, values: Vec<f64>) -> Result<Option<Start>, FitError> {
+        let states = match &self.known_states {
+            Some(states) => states.clone(),
+            None => InitialStates::guess(self.model, &values, self.runs).states,
+        };
+        let cost = self
+            .residual_vector(&self.pack(&values, &states))?
+            .norm_squared();
+        Ok(cost.is_finite().then(|| Start {
+            from: from.to_owned(),
+            values,
+            states,
+            cost,
+        }))
+    }
+
+    /// Starts scattered over the ranges of the parameters, or some decades around `values`, always the
+    /// same; the best of them first.
+    fn scattered(&self, values: &[f64]) -> Result<Vec<Start>, FitError> {
+        let mut starts = Vec::new();
+        for k in 0..SCATTERED {
+            let mut scattered = values.to_vec();
+            for (dimension, i) in self.free.iter().enumerate() {
+                let parameter = &self.model.parameters[*i];
+                scattered[*i] = scatter(parameter, values[*i], spread(k, dimension));
+            }
+            let from = format!("scattered values, {} of {SCATTERED}", k + 1);
+            starts.extend(self.start(&from, scattered)?);
+        }
+        starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        starts.truncate(OTHERS);
+        Ok(starts)
+    }
+}
+
+/// The `k`-th of points that fill the unit cube evenly, in one of its dimensions: multiples of roots of
+/// primes, without their whole part (H. Niederreiter, 1992, "Random Number Generation and Quasi-Monte
+/// Carlo Methods", theorem 4.3).
+fn spread(k: usize, dimension: usize) -> f64 {
+    const PRIMES: [f64; 12] = [
+        2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0,
+    ];
+    let root = PRIMES[dimension % PRIMES.len()].sqrt() * (1 + dimension / PRIMES.len()) as f64;
+    ((k + 1) as f64 * root).fract()
+}
+
+/// The value of a parameter at `share` of where it may be.
+fn scatter(parameter: &ModelParameter, value: f64, share: f64) -> f64 {
+    let (low, high) = parameter.declaration.bounds();
+    if low.is_finite() && high.is_finite() && low < 0.0 {
+        return low + share * (high - low);
+    }
+    if low.is_finite() && high.is_finite() && low > 0.0 {
+        return low * (high / low).powf(share);
+    }
+    let size = if value == 0.0 {
+        parameter.scale()
+    } else {
+        value
+    };
+    // A sign that is not known goes both ways: the halves of the share have one each.
+    let (sign, share) = if parameter.value.is_none() && low < 0.0 && high > 0.0 {
+        let negative = share < 0.5;
+        (if negative { -1.0 } else { 1.0 }, (2.0 * share).fract())
+    } else {
+        (size.signum(), share)
+    };
+    let value = sign * size.abs() * 10f64.powf(DECADES * (2.0 * share - 1.0));
+    parameter.declaration.nearest(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scattered_points_fill_their_range() {
+        for dimension in 0..30 {
+            let mut eighths = [0; 4];
+            for k in 0..64 {
+                let share = spread(k, dimension);
+                assert!((0.0..1.0).contains(&share));
+                eighths[(4.0 * share) as usize] += 1;
+            }
+            assert!(eighths.iter().all(|n| *n >= 10), "{dimension}: {eighths:?}");
+        }
+    }
+
+    #[test]
+    fn a_fit_that_leaves_more_than_a_constant_has_not_arrived() {
+        let of = |nrmse, settled| Convergence::of(nrmse, settled, Vec::new(), 1.0);
+        assert!(of(0.2, true).converged);
+        for (nrmse, settled) in [(1.8, true), (f64::NAN, true), (0.2, false)] {
+            let verdict = of(nrmse, settled);
+            assert!(!verdict.converged && verdict.reason.is_some());
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Single readings that no machine could have made.
+
+use loopsight_model::run::Run;
+
+use super::signal;
+use crate::fault::{Fault, FaultKind};
+use crate::map::Recording;
+
+/// How far a reading must be from the mean of its neighbours, over what is usual for that signal.
+const FAR: f64 = 12.0;
+/// How far its neighbours may be from each other, over that distance: one that is followed by others of
+/// its kind is a motion.
+const BETWEEN: f64 = 0.25;
+/// Share of the readings from which they are no accident, but how the sensor is.
+const ACCIDENTS: f64 = 0.05;
+
+/// Takes single absurd readings out of the measured signals: they count as missing, and one fault for each
+/// signal says how many.
+///
+/// A reading `y(k)` is absurd where it stands alone: with `d(k) = y(k) - (y(k-1) + y(k+1))/2`, of which
+/// the median magnitude over 0.6745 is the usual size `s`,
+///
+/// ```text
+/// |d(k)| > 12 s   and   |y(k+1) - y(k-1)| < |d(k)|/4
+/// ```
+///
+/// (F. R. Hampel, 1974, "The influence curve and its role in robust estimation", for the scale.) With
+/// Gaussian noise one reading in 10³² is. A signal that changes by steps of its resolution has one such step
+/// as its usual size at least.
+pub(crate) fn take_out(recording: &mut Recording, ids: &[&str]) -> Vec<Fault> {
+    let mut found = Vec::new();
+    for (s, id) in ids.iter().enumerate() {
+        let size = usual(&recording.runs, s);
+        let absurd: Vec<Vec<usize>> = recording.runs.iter().map(|r| alone(r, s, size)).collect();
+        let count: usize = absurd.iter().map(Vec::len).sum();
+        let readings: usize = recording.runs.iter().map(Run::len).sum();
+        if count == 0 || count as f64 > ACCIDENTS * readings as f64 {
+            continue;
+        }
+        let mut worst = (0.0f64, 0.0, 0.0);
+        for (run, absurd) in recording.runs.iter_mut().zip(&absurd) {
+            let mut measured = run.measured().to_vec();
+            let width = run.n_measured();
+            for k in absurd {
+                let off = deviation(run, s, *k).abs();
+                if off > worst.0 {
+                    worst = (off, run.sample(*k)[s], run.time()[*k]);
+                }
+                measured[k * width + s] = f64::NAN;
+            }
+            if !absurd.is_empty()
+                && let Ok(without) = run.clone().with_measured(measured)
+            {
+                *run = without;
+            }
+        }
+        let (off, value, time) = worst;
+        found.push(Fault {
+            kind: FaultKind::AbsurdValue,
+            run: String::new(),
+            signal: (*id).to_owned(),
+            detail: format!(
+                "{count} of {readings} readings stand alone, far from those before and after them (at \
+                 {time:.3} s {value:.4}, off by {off:.4}); they count as missing"
+            ),
+        });
+    }
+    found
+}
+
+/// How far a reading is from the mean of its neighbours; NaN where one is missing.
+fn deviation(run: &Run, s: usize, k: usize) -> f64 {
+    run.sample(k)[s] - 0.5 * (run.sample(k - 1)[s] + run.sample(k + 1)[s])
+}
+
+/// Usual size of that, or the resolution of the signal where that is more.
+fn usual(runs: &[Run], s: usize) -> f64 {
+    let inner = |run: &Run| 1..run.len().saturating_sub(1);
+    let mut all: Vec<f64> = runs
+        .iter()
+        .flat_map(|run| inner(run).map(|k| deviation(run, s, k).abs()))
+        .filter(|d| d.is_finite())
+        .collect();
+    if all.is_empty() {
+        return f64::INFINITY;
+    }
+    let middle = all.len() / 2;
+    let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let steps = runs.iter().flat_map(|run| {
+        let values: Vec<f64> = signal(run, s).collect();
+        values
+            .windows(2)
+            .map(|w| (w[1] - w[0]).abs())
+            .collect::<Vec<_>>()
+    });
+    // Of the changes that there are the one in the middle: a coarse signal seldom changes.
+    let mut steps: Vec<f64> = steps.filter(|d| *d > 0.0).collect();
+    if steps.is_empty() {
+        return f64::INFINITY;
+    }
+    let middle = steps.len() / 2;
+    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    (median / 0.6745).max(0.5 * step)
+}
+
+/// Readings that stand alone.
+fn alone(run: &Run, s: usize, size: f64) -> Vec<usize> {
+    (1..run.len().saturating_sub(1))
+        .filter(|k| {
+            let off = deviation(run, s, *k).abs();
+            let apart = (run.sample(k + 1)[s] - run.sample(k - 1)[s]).abs();
+            off > FAR * size && apart < BETWEEN * off
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::drive_log;
+    use super::*;
+
+    fn spikes(of: impl Fn(usize, [f64; 5]) -> [f64; 5]) -> Vec<Fault> {
+        let faults = drive_log(of).faults;
+        let absurd = |f: &Fault| f.kind == FaultKind::AbsurdValue;
+        faults.into_iter().filter(absurd).collect()
+    }
+
+    #[test]
+    fn single_absurd_readings_count_as_missing() {
+        let odd = |_: usize, mut row: [f64; 5]| {
+            if (row[0] * 100.0).round() as usize % 100 == 37 {
+                row[3] = 40.0;
+            }
+            row
+        };
+        let log = drive_log(odd);
+        assert!(
+            log.runs
+                .iter()
+                .all(|r| r.sample(37)[0].is_nan() && r.sample(36)[0].is_finite())
+        );
+        let found = spikes(odd);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(
+            found[0].detail.starts_with("8 of 800 readings"),
+            "{}",
+            found[0].detail
+        );
+    }
+
+    #[test]
+    fn motion_and_blows_are_no_spikes() {
+        assert_eq!(spikes(|_, row| row), []);
+        // A jump stays where it is, and a blow rings.
+        assert_eq!(
+            spikes(|_, mut row| {
+                row[3] += if row[0] > 2.0 { 3.0 } else { 0.0 };
+                row
+            }),
+            []
+        );
+        // What happens all the time is how the sensor is.
+        assert_eq!(
+            spikes(|_, mut row| {
+                row[3] += if (row[0] * 100.0).round() as usize % 10 == 3 {
+                    3.0
+                } else {
+                    0.0
+                };
+                row
+            }),
+            []
+        );
+    }
+}
