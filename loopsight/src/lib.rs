@@ -19,7 +19,7 @@
 //! # Ok::<(), loopsight::Error>(())
 //! ```
 //!
-//! **Fit.** The parameters, with intervals that mean what they say: [`Session::fit`].
+//! **Fit.** The parameters, with intervals of 95 %: [`Session::fit`].
 //!
 //! **Diagnose.** Which effect is missing? Every effect of the library is tried at every place, and judged on
 //! data that no fit saw. **Improve** adds what is missing and refits, until nothing more is.

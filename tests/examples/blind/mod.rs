@@ -93,11 +93,14 @@ fn named(diagnosis: &Diagnosis, id: &str, at: &[&str]) -> bool {
 fn among(first: &EffectAt, best: &Explanation, id: &str, at: &[&str]) -> bool {
     let mut class = vec![first];
     class.extend(&best.indistinguishable_from);
+    class.into_iter().any(|place| is(place, id, at))
+}
+
+/// Whether this is the effect `id` at the channels `at`.
+pub(crate) fn is(place: &EffectAt, id: &str, at: &[&str]) -> bool {
     // On an axis an effort at the load is one at the shaft times a constant.
     let one = |c: &str| if c == "load" { "shaft" } else { c }.to_owned();
-    class.iter().any(|p| {
-        p.effect == id
-            && p.at.len() == at.len()
-            && at.iter().all(|c| p.at.iter().any(|x| one(x) == one(c)))
-    })
+    place.effect == id
+        && place.at.len() == at.len()
+        && (at.iter()).all(|c| place.at.iter().any(|x| one(x) == one(c)))
 }
