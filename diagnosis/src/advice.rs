@@ -45,6 +45,12 @@ pub(crate) fn advice(
             experiment: "fit to a recording with inputs like those of the test recording: several levels, slow ramps through zero, rests, both directions".to_owned(),
         });
     }
+    if verdict == Conclusion::NotFitted {
+        list.push(Advice {
+            why: "from every start the model leaves as much as a constant would".to_owned(),
+            experiment: "look at the signs and units of inputs and measured signals, at what the equations lack entirely, and give values or ranges to start from".to_owned(),
+        });
+    }
     if verdict == Conclusion::UnknownEffect {
         list.push(Advice {
             why: "no effect of the library explains what the model does not".to_owned(),

@@ -74,9 +74,13 @@ pub(crate) fn choose(
         let near = unseen(i) <= unseen(chosen) && error(i) < never_same * error(chosen);
         near && id(i) != id(chosen)
     };
+    let significant = criteria.missing.significant;
+    let does_something = |i: usize| explanations[i].significance > significant;
     let class: Vec<EffectAt> = (0..finalists.len())
         .filter(|i| not_worse.contains(i) || as_well(*i))
         .filter(|i| *i != chosen && complexity(*i) <= complexity(chosen))
+        // What does nothing explains nothing, and ties with nobody.
+        .filter(|i| does_something(*i) || !does_something(chosen))
         .map(|i| explanations[i].place.clone())
         .collect();
     explanations[chosen].indistinguishable_from = class;

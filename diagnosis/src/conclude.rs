@@ -20,6 +20,8 @@ pub(crate) struct Evidence<'a> {
     /// The error that noise alone would leave on the judging data, and on the fitted data.
     pub(crate) floor: f64,
     pub(crate) floor_fit: f64,
+    /// A quantity of the model predicts what it leaves, on blocks that did not choose it.
+    pub(crate) predictable: bool,
     /// Least share of the standard deviation that an explanation must account for.
     pub(crate) least: f64,
 }
@@ -35,17 +37,25 @@ pub(crate) fn conclude(
     let earned = |i: usize, explanation: &Explanation| evidence.earned(&finalists[i], explanation);
     let criteria = evidence.criteria();
     let chosen = choose(explanations, finalists, evidence.floor, &earned, criteria);
+    let leader = chosen.as_ref().map(|chosen| &finalists[chosen.finalist]);
     diagnosis.missing = chosen.and_then(|chosen| {
         let best = explanations.first()?;
         evidence
             .is_missing(&finalists[chosen.finalist], best)
             .then(|| best.place.clone())
     });
+    let believed = leader.filter(|_| diagnosis.missing.is_some());
+    if evidence.not_fitted(believed) {
+        diagnosis.missing = None;
+    }
     let explained = evidence.explains_log_alone(explanations);
     let verdict = match &diagnosis.missing {
+        _ if evidence.not_fitted(believed) => Conclusion::NotFitted,
         Some(_) => Conclusion::EffectMissing,
         None if evidence.blind(explained.is_some()) => Conclusion::DataInsufficient,
-        None if evidence.above_floor(evidence.error()) => Conclusion::UnknownEffect,
+        None if evidence.above_floor(evidence.error()) || evidence.predictable => {
+            Conclusion::UnknownEffect
+        }
         None => Conclusion::NothingMissing,
     };
     let model = evidence.nominal.model;
@@ -70,6 +80,14 @@ impl Evidence<'_> {
 
     fn above_floor(&self, error: f64) -> bool {
         error > self.missing().above_floor * self.floor
+    }
+
+    /// Whether the plain model leaves as much as a constant would, and the effect that is believed does not
+    /// bring it to much less.
+    fn not_fitted(&self, believed: Option<&Judged>) -> bool {
+        let hopeless = self.criteria().start.hopeless;
+        let left = believed.map_or(f64::INFINITY, |judged| nrmse(&judged.rank));
+        nrmse(self.nominal.rank) >= hopeless && left > self.missing().rescued * hopeless
     }
 
     /// Whether a candidate does better than the plain model on data that neither saw.

@@ -32,6 +32,9 @@ pub enum Conclusion {
     DataInsufficient,
     /// The recording has a fault that makes any fit meaningless.
     LogFaulty,
+    /// The model leaves as much as a constant would from every start, and no effect of the library changes
+    /// that: nothing can be said of it.
+    NotFitted,
     /// The work was cancelled. What was found until then is given; nothing is concluded from it.
     Cancelled,
 }

@@ -23,7 +23,7 @@ use crate::search::{Found, Search};
 use crate::settings::FitSettings;
 use crate::sufficiency;
 use crate::trial::{FINAL, Judged, Nominal};
-use crate::where_it_fails::where_it_fails;
+use crate::where_it_fails::{predictable, where_it_fails};
 
 /// Adds every effect of the library to `model` at every place it fits, refits all parameters each
 /// time, and judges by the free run on data that the fits did not see.
@@ -137,6 +137,7 @@ fn steps(
         nominal_fit: diagnosis.nominal_fit,
         floor: diagnosis.floor.nrmse,
         floor_fit: floor(model, runs, &criteria.log),
+        predictable: predictable(&plain.model, &plain.solution, runs, work)?,
         least,
     };
     let verdict = conclude(diagnosis, &finalists, &evidence);
@@ -145,6 +146,7 @@ fn steps(
         diagnosis.residual_force =
             residual_force::of_solution(&plain.model, &plain.solution, runs, work)?;
     }
+    diagnosis.advice.extend(sufficiency::notes(model, runs));
     diagnosis.verdict = verdict;
     Ok(())
 }

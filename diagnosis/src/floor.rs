@@ -11,8 +11,11 @@ use crate::score::Tally;
 ///
 /// * Encoder counts: the standard deviation of rounding, from their resolution
 ///   ([`loopsight_model::sensor::Encoder::noise`]).
-/// * Other sensors: third differences of the measurement. In them a smooth motion vanishes, and white noise of
-///   variance `σ²` has the variance `20 σ²`. The median keeps jumps of the motion out.
+/// * Other sensors: differences of order `n` of the measurement. In them a smooth motion vanishes, and white
+///   noise of variance `σ²` has the variance `σ² (2n)!/(n!)²`. The median keeps jumps of the motion out. Of
+///   the orders 1 to 4 the one that says least counts: motion adds to low orders, and noise that alternates
+///   (differences of counts) to high ones. The noise is never below the rounding of the log, its least change
+///   over `√12`.
 /// * A sensor that is read more often than it has a new value (a bus that updates every 20 ms, a coarse scale):
 ///   its value is old by anything between zero and its update time `h`. Differences are taken between new
 ///   values, and the age adds `(rate · h)²/12`.
@@ -43,7 +46,7 @@ pub(crate) fn noise(
     criteria: &LogCriteria,
 ) -> (f64, f64) {
     let mut tally = Tally::default();
-    let mut thirds = Vec::new();
+    let mut differences = [const { Vec::new() }; ORDERS];
     let mut holds = Vec::new();
     let mut rate = Tally::default();
     let mut period = f64::NAN;
@@ -64,8 +67,9 @@ pub(crate) fn noise(
                 news.push((time, y));
             }
         }
-        for w in news.windows(4) {
-            thirds.push((w[3].1 - 3.0 * w[2].1 + 3.0 * w[1].1 - w[0].1).abs());
+        let changes: Vec<f64> = news.iter().map(|(_, y)| *y).collect();
+        for (order, sizes) in differences.iter_mut().enumerate() {
+            sizes.extend(difference(&changes, order + 1).map(f64::abs));
         }
         for w in news.windows(2) {
             // Over the time it took, each sample once.
@@ -79,7 +83,14 @@ pub(crate) fn noise(
     let noise = match sensor {
         Sensor::EncoderCounts(encoder) => encoder.noise(period),
         Sensor::Instantaneous | Sensor::IntervalMean => {
-            let white = median(thirds) / 0.6745 / 20f64.sqrt();
+            let resolution = resolution(&differences[0], tally.rms()) / 12f64.sqrt();
+            let orders = differences.into_iter().zip(1..);
+            let white = orders
+                .filter(|(sizes, _)| !sizes.is_empty())
+                .map(|(sizes, order)| median(sizes) / 0.6745 / gain(order).sqrt())
+                .fold(f64::INFINITY, f64::min);
+            let white = if white.is_finite() { white } else { 0.0 };
+            let white = white.max(resolution);
             let hold = median(holds);
             let age = if hold > criteria.repeats_periods * period {
                 rate.rms() * hold / 12f64.sqrt()
@@ -90,6 +101,37 @@ pub(crate) fn noise(
         }
     };
     (noise, tally.std())
+}
+
+/// Orders of the differences.
+const ORDERS: usize = 4;
+
+/// Differences of an order.
+fn difference(values: &[f64], order: usize) -> impl Iterator<Item = f64> + '_ {
+    values.windows(order + 1).map(move |w| {
+        let mut factor = 1.0;
+        let mut sum = 0.0;
+        for (k, value) in w.iter().rev().enumerate() {
+            sum += factor * value;
+            factor *= -((order - k) as f64) / (k + 1) as f64;
+        }
+        sum
+    })
+}
+
+/// Variance of the differences of an order of white noise of variance 1: `(2n)!/(n!)²`.
+fn gain(order: usize) -> f64 {
+    (1..=order).fold(1.0, |all, k| all * (order + k) as f64 / k as f64)
+}
+
+/// The least that a signal of this root mean square changes by: what it is rounded to.
+fn resolution(changes: &[f64], rms: f64) -> f64 {
+    let least = changes
+        .iter()
+        .copied()
+        .filter(|change| *change > 1e-9 * rms)
+        .fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -105,6 +147,43 @@ mod tests {
     use loopsight_model::run::Rows;
 
     use super::*;
+
+    fn of(measured: Vec<f64>) -> f64 {
+        let time = (0..measured.len()).map(|k| 0.02 * k as f64).collect();
+        let run = Run::new("", time, Rows::default(), Rows::new(1, measured)).unwrap();
+        noise(&Sensor::Instantaneous, 0, &[run], &LogCriteria::DEFAULT).0
+    }
+
+    #[test]
+    fn noise_is_found_whatever_its_colour() {
+        let mut state = 5u64;
+        let mut white = || {
+            let mut sum = 0.0;
+            for _ in 0..12 {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                sum += (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+            }
+            sum
+        };
+        let q: Vec<f64> = (0..4001).map(|_| white()).collect();
+        let motion = |k: usize| 20.0 * (0.04 * k as f64).sin();
+        let plain = of((0..4000).map(|k| motion(k) + q[k]).collect());
+        assert!((plain - 1.0).abs() < 0.1, "{plain}");
+        // Differences of counts have the variance 2, and their first differences 6, as if it were 3; the
+        // third differences have 70, as if it were 3.5.
+        let alternating = of((0..4000).map(|k| motion(k) + q[k + 1] - q[k]).collect());
+        assert!(
+            (alternating / 3f64.sqrt() - 1.0).abs() < 0.05,
+            "{alternating}"
+        );
+        // A log that is rounded has noise, however seldom it changes.
+        let rounded = of((0..4000)
+            .map(|k| (motion(k / 40) * 2.0).round() / 2.0)
+            .collect());
+        assert!(rounded >= 0.5 / 12f64.sqrt() - 1e-12, "{rounded}");
+    }
 
     /// A sine of amplitude 1 and 2 rad/s, read every 5 ms, new every 20 ms.
     #[test]

@@ -125,7 +125,9 @@ impl State {
             Fit::cancelled(model, Method::OutputError, error, 0)
         };
         let (best, verdict) = match verdict {
-            Conclusion::LogFaulty | Conclusion::DataInsufficient => (None, verdict),
+            Conclusion::LogFaulty | Conclusion::DataInsufficient | Conclusion::NotFitted => {
+                (None, verdict)
+            }
             Conclusion::Cancelled => (None, verdict),
             _ => match fit(&self.present, measurements, &settings, &work.silently()) {
                 Err(FitError::Cancelled(Cancelled)) => (None, Conclusion::Cancelled),

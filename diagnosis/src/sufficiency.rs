@@ -17,6 +17,36 @@ fn moves(run: &Run) -> bool {
     })
 }
 
+/// Whether any input varies.
+fn varies(runs: &[Run]) -> bool {
+    let first = runs.iter().find(|r| !r.is_empty()).map(|r| r.input(0));
+    runs.iter()
+        .any(|r| (0..r.len()).any(|k| first.is_some_and(|first| r.input(k) != first)))
+}
+
+/// What to know of a recording that can: inputs that are constant and not zero, while others vary.
+pub(crate) fn notes(model: &Model, runs: &[Run]) -> Vec<Advice> {
+    let value = |i: usize| {
+        let mut values = (runs.iter()).flat_map(move |r| (0..r.len()).map(move |k| r.input(k)[i]));
+        let first = values.next()?;
+        values.all(|v| v == first).then_some(first)
+    };
+    let inputs = model.plant.inputs.iter().enumerate();
+    inputs
+        .filter(|(_, input)| !input.optional)
+        .filter_map(|(i, input)| {
+            let value = value(i).filter(|v| *v != 0.0)?;
+            Some(Advice {
+                why: format!(
+                    "`{}` is {value} {} all the time: it counts as known, and what its changes do does not show",
+                    input.id, input.unit
+                ),
+                experiment: format!("where that matters, record at other values of `{}`", input.id),
+            })
+        })
+        .collect()
+}
+
 /// Reasons why not; empty when it can.
 pub(crate) fn reasons(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Vec<Advice> {
     let least = criteria.motion_s;
@@ -52,7 +82,8 @@ pub(crate) fn reasons(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Ve
         let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
             (a.min(v), b.max(v))
         });
-        if low >= high {
+        // A known influence that happens to be constant is known; an input that is never used teaches nothing.
+        if low >= high && !(low != 0.0 && varies(runs)) {
             say(
                 format!("`{}` is {low} {} all the time", input.id, input.unit),
                 "vary every input: a pseudo-random sequence of several levels",

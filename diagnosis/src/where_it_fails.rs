@@ -83,6 +83,57 @@ pub(crate) fn where_it_fails(
     Ok(list)
 }
 
+/// Contiguous parts of a log by which a prediction is tried on samples that did not choose it.
+const PARTS: usize = 16;
+
+/// Whether a quantity of the model predicts the error of a measured signal, on parts of the log that did
+/// not choose the prediction: then that error is no noise.
+pub(crate) fn predictable(
+    model: &Model,
+    solution: &Solution,
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<bool, Cancelled> {
+    let least = work.criteria().missing.predicted;
+    let all = collect(model, solution, runs, work)?;
+    Ok(all.iter().any(|samples| {
+        let mut quantities = samples.quantities.iter();
+        quantities.any(|values| predicted(values, &samples.error) > least)
+    }))
+}
+
+/// Share of the squared error that means over bins of a quantity take away, each learned from the other
+/// half of the parts of the log; negative where they only add to it.
+fn predicted(values: &[f64], errors: &[f64]) -> f64 {
+    let (low, high) = extent(values);
+    if high <= low || !(high - low).is_finite() {
+        return 0.0;
+    }
+    let half = |k: usize| (k * PARTS / errors.len().max(1)) % 2;
+    let bin = |value: f64| ((((value - low) / (high - low)) * BINS as f64) as usize).min(BINS - 1);
+    let mut sums = [[(0.0f64, 0usize); BINS]; 2];
+    for (k, (value, error)) in values.iter().zip(errors).enumerate() {
+        let sum = &mut sums[half(k)][bin(*value)];
+        sum.0 += error;
+        sum.1 += 1;
+    }
+    let (mut before, mut after) = (0.0, 0.0);
+    for (k, (value, error)) in values.iter().zip(errors).enumerate() {
+        let (sum, n) = sums[1 - half(k)][bin(*value)];
+        before += error * error;
+        after += (error - sum / n.max(1) as f64).powi(2);
+    }
+    1.0 - after / before
+}
+
+fn extent(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+            (a.min(*v), b.max(*v))
+        })
+}
+
 /// The samples of each measured signal.
 fn collect(
     model: &Model,
@@ -226,11 +277,7 @@ fn dependence(
     let all: f64 = samples.error.iter().map(|e| e * e).sum();
     let mut best: Option<(f64, &str)> = None;
     for (signal, values) in signals(model.plant).zip(&samples.quantities) {
-        let (low, high) = values
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-                (a.min(*v), b.max(*v))
-            });
+        let (low, high) = extent(values);
         if high <= low || !(high - low).is_finite() {
             continue;
         }
@@ -283,4 +330,29 @@ fn by_run(name: &str, runs: &[Run], samples: &Samples, criteria: &FailsCriteria)
         );
         (said, error)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_not_predicted_and_a_law_is() {
+        let mut state = 1u64;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let values: Vec<f64> = (0..3000).map(|k| (0.01 * f64::from(k)).sin()).collect();
+        let white: Vec<f64> = values.iter().map(|_| noise()).collect();
+        assert!(predicted(&values, &white) < 0.02);
+        let law: Vec<f64> = values.iter().map(|v| 0.3 * v.signum() + noise()).collect();
+        let share = predicted(&values, &law);
+        assert!((share - 0.09 / (0.09 + 1.0 / 12.0)).abs() < 0.05, "{share}");
+        // What happened in one half only is predicted by nothing.
+        let drift: Vec<f64> = (0..3000).map(f64::from).collect();
+        assert!(predicted(&drift, &white) < 0.02);
+    }
 }

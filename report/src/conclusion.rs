@@ -11,7 +11,10 @@ pub(crate) fn conclusion(said: &Said, verdict: Conclusion) -> String {
         Conclusion::EffectMissing => "missing",
         Conclusion::NothingMissing => "nothing",
         Conclusion::UnknownEffect => "unknown",
-        Conclusion::DataInsufficient | Conclusion::LogFaulty | Conclusion::Cancelled => "refused",
+        Conclusion::DataInsufficient
+        | Conclusion::LogFaulty
+        | Conclusion::NotFitted
+        | Conclusion::Cancelled => "refused",
     };
     let paragraphs = |sentences: &[String], class: &str| -> String {
         sentences

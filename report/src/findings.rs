@@ -17,13 +17,14 @@ const MODEL: &str = "name = \"Twil\"\n[plant.ddmr]\nK_A = -15.146\nK_B = 0.0\nK_
     K_D = -9.573\nK_E = 0.0\nK_F = 0.656\nhalf_track = 0.131\nwheel_radius = 0.05\n\
     [[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel = 0.9\n";
 
-const ALL: [Conclusion; 6] = [
+const ALL: [Conclusion; 7] = [
     Conclusion::EffectMissing,
     Conclusion::NothingMissing,
     Conclusion::UnknownEffect,
     Conclusion::DataInsufficient,
     Conclusion::LogFaulty,
     Conclusion::Cancelled,
+    Conclusion::NotFitted,
 ];
 
 fn model(effects: usize) -> Model {
@@ -189,6 +190,7 @@ fn every_conclusion_has_its_sentence() {
         "This log is not enough to judge the model.",
         "The log is faulty, so it says nothing about the model.",
         "The diagnosis was cancelled.",
+        "The model could not be fitted.",
     ]) {
         let page = page_of(&diagnosis(verdict));
         assert!(
@@ -215,6 +217,7 @@ fn every_end_of_an_improvement_has_its_sentence() {
         "The log does not show what is left",
         "The log does not show what is left",
         "The work was cancelled: more may be missing.",
+        "The log does not show what is left",
     ]) {
         let page = improvement_page(&context(), &improvement(verdict), None, None);
         let page = opened(&page);

@@ -108,7 +108,7 @@ pub(crate) fn after_diagnosis(context: &Context, diagnosis: &Diagnosis) -> Vec<H
                 .into(),
             files.on_another("diagnose", "diagnosis.html"),
         )],
-        (Conclusion::DataInsufficient | Conclusion::LogFaulty | Conclusion::Cancelled, _) => {
+        (Conclusion::DataInsufficient | Conclusion::LogFaulty | Conclusion::NotFitted | Conclusion::Cancelled, _) => {
             again(&files, "diagnose")
         }
     }

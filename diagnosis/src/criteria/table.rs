@@ -159,6 +159,10 @@ criteria! {
         least_share: f64 = 0.004 "1", Judgement: "below it a library finds something for every imperfection of a sensor";
         /// Standard error over the value beyond which the log says nothing of a parameter.
         undetermined: f64 = 10.0 "1", Judgement: "ten times not pinned";
+        /// Share of the squared error that a quantity of the model predicts on blocks that did not choose it, beyond which it is no noise.
+        predicted: f64 = 0.1 "1", Judgement: "of noise a quantity predicts less than nothing, and a model is never quite the machine";
+        /// Share of what a constant leaves, to which an effect must bring a model that leaves as much, to be believed.
+        rescued: f64 = 0.5 "1", Judgement: "half of the signal is followed then";
         /// Error over the floor below which a log explains itself.
         explained: f64 = 1.3 "floors", Judgement: "between complete and above_floor";
         /// Error over the floor above which something must be missing.

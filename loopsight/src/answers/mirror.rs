@@ -47,6 +47,9 @@ mirror! {
         DataInsufficient,
         /// The recording is at fault.
         LogFaulty,
+        /// The model leaves as much as a constant would from every start, and no effect of the library
+        /// changes that: nothing can be said of it.
+        NotFitted,
         /// The work was cancelled: what was found until then is there, and nothing is concluded from it.
         Cancelled,
     }

@@ -47,6 +47,7 @@ pub fn said(diagnosis: &Diagnosis) -> Said {
             "The log is faulty, so it says nothing about the model.".to_owned(),
             vec!["Nothing was fitted to it.".to_owned()],
         ),
+        Conclusion::NotFitted => not_fitted(diagnosis),
         Conclusion::Cancelled => (
             "The diagnosis was cancelled.".to_owned(),
             vec!["What was tried until then allows no conclusion.".to_owned()],
@@ -64,6 +65,9 @@ pub fn said(diagnosis: &Diagnosis) -> Said {
         open: open(diagnosis),
     }
 }
+
+/// Error over the floor above which an effect explains only a part of it.
+const PART: f64 = 1.5;
 
 fn effect_missing(diagnosis: &Diagnosis) -> (String, Vec<String>) {
     let Some(missing) = &diagnosis.missing else {
@@ -83,7 +87,17 @@ fn effect_missing(diagnosis: &Diagnosis) -> (String, Vec<String>) {
             error(diagnosis.floor.nrmse)
         ));
     }
-    (format!("The model lacks {}.", place(missing)), because)
+    // The conclusion calls an error above half as much again too large for noise.
+    let far = |best: &Explanation| best.nrmse > PART * diagnosis.floor.nrmse;
+    let headline = if found(diagnosis).is_some_and(far) {
+        format!(
+            "The model lacks {}, which explains part of the error.",
+            place(missing)
+        )
+    } else {
+        format!("The model lacks {}.", place(missing))
+    };
+    (headline, because)
 }
 
 fn nothing_missing(diagnosis: &Diagnosis) -> (String, Vec<String>) {
@@ -105,6 +119,14 @@ fn unknown_effect(diagnosis: &Diagnosis) -> (String, Vec<String>) {
     }
     let headline = "Something is missing, and no effect of the library explains it.";
     (headline.to_owned(), because)
+}
+
+fn not_fitted(diagnosis: &Diagnosis) -> (String, Vec<String>) {
+    let because = format!(
+        "From every start it leaves a free-run error of {}: as much as a constant would, or more.",
+        error(diagnosis.nominal.nrmse)
+    );
+    ("The model could not be fitted.".to_owned(), vec![because])
 }
 
 /// What the model as it is leaves, and what noise would.

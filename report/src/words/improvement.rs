@@ -76,7 +76,7 @@ fn rest(verdict: Conclusion, floor: &str) -> String {
             "Noise and resolution alone would leave {floor}: more may be missing, but with still more effects \
              any log can be fitted. The search stopped here."
         ),
-        Conclusion::DataInsufficient | Conclusion::LogFaulty => {
+        Conclusion::DataInsufficient | Conclusion::LogFaulty | Conclusion::NotFitted => {
             "The log does not show what is left. The advice says what to record.".to_owned()
         }
         Conclusion::Cancelled => "The work was cancelled: more may be missing.".to_owned(),
