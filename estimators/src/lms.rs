@@ -9,10 +9,14 @@ use crate::estimate::{error, is_start, set};
 mod settings;
 pub use settings::{LmsError, LmsSettings};
 
+/// Samples over which the mean power is taken.
+const WINDOW: f64 = 100.0;
+
 /// Normalised least mean squares (LMS) with leakage: the gradient step of one sample.
 ///
 /// ```text
-/// e = y - φᵀθ        θ <- θ + μ φ e/(ε + φᵀφ) + γ (θ₀ - θ)
+/// p <- p + (φᵀφ - p)/min(k, 100)
+/// e = y - φᵀθ        θ <- θ + μ φ e/(ε + max(φᵀφ, p)) + γ (θ₀ - θ)
 /// ```
 ///
 /// | symbol | what | unit |
@@ -20,8 +24,13 @@ pub use settings::{LmsError, LmsSettings};
 /// | `y`, `φ` | measurement, regressor | unit of `y`; of `y/θ_i` |
 /// | `θ`, `θ₀` | estimate, where it started | of the parameters |
 /// | `μ` | step, in (0, 2): the share of the error that one sample takes away | 1 |
-/// | `ε` | keeps the step small where the regressor is | of `φᵀφ` |
+/// | `p` | mean of `φᵀφ` over about a hundred samples | of `φᵀφ` |
+/// | `ε` | keeps the step small where every regressor is | of `φᵀφ` |
 /// | `γ` | leakage per sample, in [0, 1): pulls back to the start what nothing excites | 1 |
+///
+/// A sample with less than the mean power teaches less by so much: what the model lacks (friction, a count of an
+/// encoder) does not shrink with the regressor, and over its own power it would count for the more the less there
+/// is to learn from.
 ///
 /// The cheapest estimator there is: `2n` multiplications, no matrix. It converges slowly where the
 /// regressors are of different sizes or alike; the loop's scaling of parameters helps with the first
@@ -58,6 +67,8 @@ where
     step: S,
     leakage: S,
     regularization: S,
+    power: S,
+    samples: S,
 }
 
 impl<S: Real, D: Dim> Lms<S, D>
@@ -81,6 +92,8 @@ where
             step: S::of(settings.step),
             leakage: S::of(settings.leakage),
             regularization: S::of(settings.regularization),
+            power: S::zero(),
+            samples: S::zero(),
         })
     }
 }
@@ -99,8 +112,10 @@ where
         if regressor.len() != self.theta.len() {
             return Innovation::refused();
         }
-        let power = (regressor.iter()).fold(self.regularization, |sum, phi| sum + *phi * *phi);
-        let gain = self.step * innovation / power;
+        let power = (regressor.iter()).fold(S::zero(), |sum, phi| sum + *phi * *phi);
+        let samples = (self.samples + S::one()).min(S::of(WINDOW));
+        let mean = self.power + (power - self.power) / samples;
+        let gain = self.step * innovation / (self.regularization + power.max(mean));
         for (i, next) in self.next.iter_mut().enumerate() {
             let theta = self.theta[i];
             *next = theta + gain * regressor[i] + self.leakage * (self.start[i] - theta);
@@ -109,6 +124,7 @@ where
             return Innovation::refused();
         }
         self.theta.copy_from(&self.next);
+        (self.power, self.samples) = (mean, samples);
         Innovation {
             innovation,
             relative_variance: S::one(),
@@ -131,6 +147,7 @@ where
     fn reset(&mut self, theta: &[S]) {
         self.set_theta(theta);
         self.start.copy_from(&self.theta);
+        (self.power, self.samples) = (S::zero(), S::zero());
     }
 }
 

@@ -39,7 +39,7 @@ pub struct SupervisorSettings {
     pub stale_s: f64,
     /// How long the learned model must have been good, while it learned, before it is handed over, s.
     pub calm_s: f64,
-    /// How often in a minute the learned model may be left before the loop stops.
+    /// How often in a minute the learned model may be left until it is not used again for a minute.
     pub falls: u32,
 }
 
@@ -229,7 +229,9 @@ pub fn described(event: &Event<f64>, signals: &[(&str, &str)], turning: &[String
             unit(i)
         ),
         Cause::Stale => format!("no fresh sample for {value:.2} s (limit {limit} s)"),
-        Cause::Relapse => format!("fell back {value:.0} times within a minute (limit {limit:.0})"),
+        Cause::Relapse => format!(
+            "fell back {value:.0} times within a minute (limit {limit:.0}), so nothing that is learned is used for a minute"
+        ),
         Cause::Calm => {
             format!("it predicted no worse than the last good model for {limit} s of learning")
         }

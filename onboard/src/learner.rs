@@ -91,7 +91,9 @@ impl<R: Parts> Learner<R> {
         let sized = (lists.iter()).all(|l| l.len() == PerParameter::<R>::LENGTH)
             && settings.dead_zone.len() == PerInput::<R>::LENGTH
             && settings.least_excitation.len() == PerInput::<R>::LENGTH;
-        if !sized {
+        // A host says how far an estimate may go: without a bound nobody would.
+        let bounds = settings.low.iter().chain(&settings.high);
+        if !(sized && bounds.into_iter().all(|b| b.is_finite())) {
             return Err(Unusable::Learning);
         }
         let mut wrong = Unusable::Plant;

@@ -250,15 +250,17 @@ where
         self.rotated[(i, i)]
     }
 
-    /// Of `psi`, the last sample, the part along directions with `√m ≥ m₀`; `|ψ'|²`, where `square` is
-    /// `|ψ|²`.
-    pub(super) fn excited(&self, psi: &mut [S], mut square: S) -> S {
+    /// Whether a direction is not excited, `√m < m₀`.
+    pub(super) fn masks(&self) -> bool {
+        let n = self.seen.len();
+        (0..n).any(|i| self.mean(i) < self.floors[0])
+    }
+
+    /// Of `psi`, the last sample, the part along directions with `√m ≥ m₀`; `|ψ'|²`.
+    pub(super) fn excited(&self, psi: &mut [S]) -> S {
         let n = psi.len();
-        if (0..n).all(|i| self.mean(i) >= self.floors[0]) {
-            return square;
-        }
         psi.fill(S::zero());
-        square = S::zero();
+        let mut square = S::zero();
         for (i, direction) in self.directions.as_slice().chunks_exact(n).enumerate() {
             if self.mean(i) >= self.floors[0] {
                 let along = self.seen[i];
@@ -418,9 +420,9 @@ mod tests {
         for _ in 0..1000 {
             let (a, b) = (random.next(), 1e-4 * random.next());
             let psi = [a * along[0] - b * along[1], a * along[1] + b * along[0]];
-            let square = information.take(&psi);
+            information.take(&psi);
             let mut part = psi;
-            let left = information.excited(&mut part, square.unwrap_or(f64::NAN));
+            let left = information.excited(&mut part);
             assert!((left - a * a).abs() < 1e-3 * a.abs() + 1e-7, "{left} {a}");
             let across = part[1] * along[0] - part[0] * along[1];
             assert!(across.abs() < 1e-3 * a.abs() + 1e-7, "{across}");

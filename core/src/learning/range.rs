@@ -14,6 +14,27 @@ pub struct Range<S> {
 }
 
 impl<S: Real> Range<S> {
+    /// Scales that are far for a parameter: ten times the size of a noticeable change.
+    pub const REACH: f64 = 10.0;
+
+    /// Of this, what is no more than `reach` scales away from `start`.
+    pub fn within_reach(self, start: S, reach: f64) -> Self {
+        let away = S::of(reach) * self.scale;
+        Self {
+            low: self.low.max(start - away),
+            high: self.high.min(start + away),
+            ..self
+        }
+    }
+
+    /// Whether there is a finite value within, and the scale is a finite number above 0.
+    pub fn is_usable(&self) -> bool {
+        let scaled = self.scale > S::zero() && self.scale.is_finite();
+        let least = S::of(f64::NEG_INFINITY);
+        let greatest = S::of(f64::INFINITY);
+        scaled && self.low <= self.high && self.low < greatest && self.high > least
+    }
+
     /// The range a plant or an effect declares, away from where its equations fail.
     ///
     /// An open bound, and zero for a parameter that the equations are divided by

@@ -15,22 +15,28 @@ const MOVING: f64 = 0.3;
 /// How much worse a model may predict that still counts as no worse (in power).
 const NO_WORSE: f64 = 1.21;
 
-/// Two sets of values for the parameters of one model.
+/// Three sets of values for the parameters of one model: what is learned, what was good last, and where it
+/// began.
 #[derive(Clone, Debug)]
 pub(super) struct Models<S, B> {
     /// What the observer taught last; where it never did, the model's own values.
     learned: B,
     /// What the controller is given when the learned model is left.
     good: B,
+    /// What the controller's model was built with.
+    first: B,
+    /// The good one is the first one.
+    pub(super) is_first: bool,
     /// Above 0 where the observer ever taught a value.
     taught: B,
-    /// Mean squares over the window, by regression: of the learned model's innovation, of what
-    /// the good one leaves unexplained, and of the measured rate; the last one's recent peak.
+    /// Mean squares over the window, by regression: of the learned model's innovation, of what the good
+    /// one and the first one leave unexplained, and of the measured rate; the last one's recent peak.
     now: B,
     past: B,
+    origin: B,
     rate: B,
     peak: B,
-    /// Mean square of the smaller of the first two over a long time.
+    /// Mean square of the smallest of the first three over a long time.
     usual: B,
     last: B,
     age: S,
@@ -79,9 +85,12 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
         Self {
             taught: zeros(values.as_ref().len()),
             learned: values.clone(),
-            good: values,
+            good: values.clone(),
+            first: values,
+            is_first: true,
             now: zeros(rows),
             past: zeros(rows),
+            origin: zeros(rows),
             rate: zeros(rows),
             peak: zeros(rows),
             usual: zeros(rows),
@@ -140,16 +149,24 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
                 continue;
             };
             self.taught_now |= innovation.accepted;
-            let left = observer.residual(row, self.good.as_ref());
-            let left = left.unwrap_or(innovation.innovation);
-            let (e, g) = (innovation.innovation, left);
+            let e = innovation.innovation;
+            let left = |values: &B| observer.residual(row, values.as_ref()).unwrap_or(e);
+            let g = left(&self.good);
+            let f = if self.is_first { g } else { left(&self.first) };
             blend(&mut self.now.as_mut()[row], e * e, share);
             blend(&mut self.past.as_mut()[row], g * g, share);
+            blend(&mut self.origin.as_mut()[row], f * f, share);
             if calm {
-                let better = self.now.as_ref()[row].min(self.past.as_ref()[row]);
-                blend(&mut self.usual.as_mut()[row], better, slow);
+                let best = self.best(row);
+                blend(&mut self.usual.as_mut()[row], best, slow);
             }
         }
+    }
+
+    /// Mean square of what the best of the three leaves unexplained.
+    fn best(&self, row: usize) -> S {
+        let of = |means: &B| means.as_ref()[row];
+        of(&self.now).min(of(&self.past)).min(of(&self.origin))
     }
 
     /// Mean square of a share of the measured rate.
@@ -165,11 +182,10 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
         })
     }
 
-    /// How many times as large as usual the innovation of the better model is, where it is largest.
+    /// How many times as large as usual the innovation of the best model is, where it is largest.
     pub(super) fn unusual(&self) -> Option<(usize, S)> {
         self.largest(|models, row| {
-            let better = models.now.as_ref()[row].min(models.past.as_ref()[row]);
-            better / models.usual.as_ref()[row].max(models.floor(row, MOVING))
+            models.best(row) / models.usual.as_ref()[row].max(models.floor(row, MOVING))
         })
     }
 
@@ -187,16 +203,37 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Models<S, B> {
 
     /// True where the learned model predicts no worse than the good one.
     pub(super) fn learned_is_good(&self) -> bool {
-        (0..self.now.as_ref().len()).all(|row| {
-            let limit = self.past.as_ref()[row] * S::of(NO_WORSE) + self.floor(row, ALIKE);
-            self.now.as_ref()[row] <= limit
-        })
+        self.no_worse(&self.now, &self.past)
+    }
+
+    /// True where the first model predicts better than the good one.
+    pub(super) fn first_is_better(&self) -> bool {
+        !self.is_first && !self.no_worse(&self.past, &self.origin)
+    }
+
+    /// True where the good model is not the first one, which predicts no worse.
+    pub(super) fn first_is_good(&self) -> bool {
+        !self.is_first && self.no_worse(&self.origin, &self.past)
+    }
+
+    /// Whether the model with the mean squares `of` predicts no worse than the one with those `by`.
+    fn no_worse(&self, of: &B, by: &B) -> bool {
+        let (of, by) = (of.as_ref(), by.as_ref());
+        (0..of.len()).all(|row| of[row] <= by[row] * S::of(NO_WORSE) + self.floor(row, ALIKE))
     }
 
     /// The learned model becomes the good one.
     pub(super) fn promote(&mut self) {
         self.good.as_mut().copy_from_slice(self.learned.as_ref());
         self.past.as_mut().copy_from_slice(self.now.as_ref());
+        self.is_first = false;
+    }
+
+    /// The first model becomes the good one.
+    pub(super) fn begin_again(&mut self) {
+        self.good.as_mut().copy_from_slice(self.first.as_ref());
+        self.past.as_mut().copy_from_slice(self.origin.as_ref());
+        self.is_first = true;
     }
 
     /// The good model takes the place of the learned one, with the controller and the observer.

@@ -13,6 +13,11 @@ const STILL: f64 = 1e-6;
 /// Share of the largest speed asked for below which a shaft may well stand.
 const MATTERS: f64 = 0.1;
 
+/// Times as long a shaft may keep its speed that has a reason to: one that turns the right way with all there is (a
+/// constant voltage gives a constant speed, and a coarse encoder the same count), and one that came to rest
+/// gradually, which dry friction holds until the integrator has wound up that far.
+const PATIENCE: f64 = 4.0;
+
 /// When a supervisor acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds<S> {
@@ -28,13 +33,14 @@ pub struct Thresholds<S> {
     pub tracking_share: S,
     /// How long a tracking error may be beyond its limit, s.
     pub tracking_for: S,
-    /// How long a shaft that should turn otherwise may keep its speed, s.
+    /// How long a shaft that should turn otherwise may keep its speed, s; four times as long where it turns the
+    /// right way while an actuator saturates, or came to rest gradually.
     pub frozen: S,
     /// How long there may be no fresh sample, s.
     pub stale: S,
     /// How long the learned model must have been good, while it learned, before it is handed over, s.
     pub calm: S,
-    /// How often in a minute the learned model may be left before the loop stops.
+    /// How often in a minute the learned model may be left until it is not used again for a minute.
     pub falls: u32,
 }
 
@@ -81,9 +87,11 @@ pub struct Supervisor<S, B> {
     off_for: B,
     /// Speed of each shaft from the controlled signals, row by row.
     shafts: B,
-    /// By shaft: how long it has kept its speed, that speed, and the largest one asked for so far.
+    /// By shaft: how long it has kept its speed, that speed, by how much it changed last within a period, and
+    /// the largest one asked for so far.
     frozen_for: B,
     last: B,
+    change: B,
     largest_speed: B,
     reference: B,
     stale_for: S,
@@ -123,6 +131,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
             off_for: zeros(n),
             frozen_for: zeros(turning),
             last: zeros(turning),
+            change: zeros(turning),
             largest_speed: zeros(turning),
             shafts,
             reference: zeros(n),
@@ -156,11 +165,11 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
                 return Some(stopped(Cause::Range(i), *y, limit));
             }
         }
-        self.frozen(seen.measured, period)
+        self.frozen(seen.measured, seen.outcome.saturated, period)
     }
 
     /// A shaft that keeps its speed, far from the one asked for.
-    fn frozen(&mut self, measured: &[S], period: S) -> Option<Event<S>> {
+    fn frozen(&mut self, measured: &[S], saturated: bool, period: S) -> Option<Event<S>> {
         let rows = self.shafts.as_ref().chunks_exact(self.controlled);
         for (i, row) in rows.enumerate() {
             let speed = |of: &[S]| {
@@ -172,6 +181,13 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
             *largest = largest.max(wanted.abs());
             let last = core::mem::replace(&mut self.last.as_mut()[i], is);
             let stands = (is - last).abs() <= *largest * S::of(STILL);
+            let slow = *largest * S::of(MATTERS);
+            let change = &mut self.change.as_mut()[i];
+            if !stands {
+                *change = (is - last).abs();
+            }
+            let came_to_rest = is.abs() <= slow && *change <= slow;
+            let flat_out = saturated && is * wanted > S::zero();
             let matters = wanted.abs() > *largest * S::of(MATTERS);
             let should = matters && (wanted - is).abs() > wanted.abs() * S::of(0.5);
             let clock = &mut self.frozen_for.as_mut()[i];
@@ -180,7 +196,11 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
             } else {
                 S::zero()
             };
-            if let Some(event) = over(*clock, self.thresholds.frozen, Cause::Frozen(i)) {
+            let mut limit = self.thresholds.frozen;
+            if flat_out || came_to_rest {
+                limit *= S::of(PATIENCE);
+            }
+            if let Some(event) = over(*clock, limit, Cause::Frozen(i)) {
                 return Some(event);
             }
         }
@@ -207,8 +227,14 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
                 self.thresholds.tracking_share * *largest
             };
             let error = (*r - *y).abs();
+            // Who asks for more than there is gets less; only what goes the wrong way is lost then.
+            let beyond = if seen.outcome.saturated {
+                limit.max(r.abs())
+            } else {
+                limit
+            };
             let clock = &mut self.off_for.as_mut()[i];
-            *clock = if error > limit && limit > S::zero() {
+            *clock = if error > beyond && limit > S::zero() {
                 *clock + seen.tick.period
             } else {
                 (*clock - seen.tick.period).max(S::zero())
@@ -228,9 +254,15 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
     ) -> Event<S> {
         let most = self.thresholds.falls;
         self.falls += 1;
-        if self.falls > most {
-            let times = S::of(f64::from(self.falls));
-            return stopped(Cause::Relapse, times, S::of(f64::from(most)));
+        let (cause, value, limit) = if self.falls == most.saturating_add(1) {
+            let count = |n: u32| S::of(f64::from(n));
+            (Cause::Relapse, count(self.falls), count(most))
+        } else {
+            (cause, value, limit)
+        };
+        // The good model had its turn, or never deserved it.
+        if self.models.first_is_better() || self.fallen && self.models.first_is_good() {
+            self.models.begin_again();
         }
         self.models.restore(observer, model);
         self.fallen = true;
@@ -247,7 +279,8 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
 
     /// Hands the learned model over, or makes it the good one, once it was good for long enough.
     fn trust(&mut self, calm: bool, period: S) -> Option<Event<S>> {
-        if !(calm && self.models.learned_is_good()) {
+        let patient = self.falls <= self.thresholds.falls;
+        if !(calm && patient && self.models.learned_is_good()) {
             self.calm_for = S::zero();
             return None;
         }
@@ -320,6 +353,9 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervise<S> for Supervisor<S,
             return Some(self.fall_back(reason, observer, model));
         }
         if let Some((cause, value, limit)) = lost {
+            if self.proved && self.models.first_is_good() {
+                return Some(self.fall_back((cause, value, limit), observer, model));
+            }
             // A first guess that does not even track has nothing to lose by what predicts better.
             if self.proved || !self.models.adapts() || !self.models.learned_is_good() {
                 return Some(stopped(cause, value, limit));

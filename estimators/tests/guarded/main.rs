@@ -10,6 +10,7 @@
 )]
 
 mod bench;
+mod law;
 
 use bench::{Any, FLOOR, ROWS, Random, Robot, covariance, distance, guard, is_covariance, ranges};
 use loopsight_core::learning::{Guarded, Guards, Range, Withheld};

@@ -33,6 +33,9 @@ pub struct LearningSettings {
     /// How near an estimate may come to where the equations fail (an open bound, a gain of zero), as
     /// a share of the start's distance from there. Default: 0.1.
     pub clearance: f64,
+    /// How many of its scales a parameter may be away from the model file's value, where `range` does not say how
+    /// far it may go. Default: 10.
+    pub reach: f64,
     /// By parameter, `[low, high]` within which it is estimated, in its unit. Default: what the plant
     /// and the effects declare.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -51,6 +54,7 @@ impl Default for LearningSettings {
             least_excitation: BTreeMap::new(),
             window_s: 2.0,
             clearance: 0.1,
+            reach: Range::<f64>::REACH,
             range: BTreeMap::new(),
         }
     }
@@ -90,6 +94,10 @@ impl LearningSettings {
             );
             return Err(BuildError::at("clearance", message));
         }
+        if !(self.reach > 0.0 && self.reach.is_finite()) {
+            let message = format!("`reach` is {}, expected a number above 0", self.reach);
+            return Err(BuildError::at("reach", message));
+        }
         let names: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
         for (name, [low, high]) in &self.range {
             let path = format!("range.{name}");
@@ -110,7 +118,8 @@ impl LearningSettings {
         let parameter = &model.parameters[index];
         let start = parameter.value.unwrap_or(0.0);
         let declaration = parameter.declaration;
-        let mut range = Range::of(declaration, parameter.size, start, self.clearance);
+        let declared = Range::of(declaration, parameter.size, start, self.clearance);
+        let mut range = declared.within_reach(declaration.nearest(start), self.reach);
         if let Some([low, high]) = self.range.get(&parameter.name) {
             let admitted = Range {
                 low: low.max(declaration.min),

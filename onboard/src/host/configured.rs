@@ -116,15 +116,24 @@ impl Aboard {
             let range = match settings.range.get(declaration.id) {
                 // A parameter that the file freezes stays where it is.
                 _ if named.is_some_and(|p| !p.free) => [*value; 2],
-                Some([low, high]) if low < high && (*low..=*high).contains(value) => [*low, *high],
+                Some([low, high])
+                    if low < high
+                        && low.is_finite()
+                        && high.is_finite()
+                        && (*low..=*high).contains(value) =>
+                {
+                    [*low, *high]
+                }
                 Some(range) => {
                     let id = declaration.id;
-                    let message =
-                        format!("`{id}` is {range:?}, expected [low, high] with {value} within");
+                    let message = format!(
+                        "`{id}` is {range:?}, expected finite [low, high] with {value} within"
+                    );
                     return Err(BuildError::at(&format!("learning.range.{id}"), message));
                 }
                 None => {
                     let range = Range::of(declaration, 1.0, *value, settings.clearance);
+                    let range = range.within_reach(declaration.nearest(*value), settings.reach);
                     [range.low, range.high]
                 }
             };

@@ -28,7 +28,7 @@ pub(crate) fn list<T: Clone, const N: usize>(values: &[T]) -> Vec<T, N> {
 
 /// Adaptive, friction compensated, the paper's gains.
 pub(crate) fn configuration() -> Configuration {
-    let open = f32::INFINITY;
+    let open = 1e3;
     Configuration {
         plant: "ddmr".try_into().unwrap(),
         parameters: list(&BELIEVED),
