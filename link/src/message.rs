@@ -144,4 +144,6 @@ pub enum Note {
     /// Said by a host on behalf of the robot that it runs: the robot drives, and goes on with what it is
     /// told.
     Runs,
+    /// Said by a host that speaks with another visitor: come again later.
+    Busy,
 }

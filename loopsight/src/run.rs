@@ -126,6 +126,7 @@ impl Session {
         };
         if let Some(path) = &log_path {
             files::writable(path)?;
+            files::apart(path, [control.file(), &control.model_file()])?;
         }
         // The timer of a robot that runs the law itself is not the host's to measure.
         let real_time = (file.real_time || !file.driver.is_simulated()) && !file.driver.runs_law();
@@ -140,10 +141,21 @@ impl Session {
                     .map_err(|e| wrong(path, &e))?,
             ),
         };
-        let end = drive::drive(control, &mut composed, &mut recorder, log.as_mut(), options);
+        let mut end = drive::drive(control, &mut composed, &mut recorder, log.as_mut(), options);
         let mut written = None;
-        if let (Some(log), Some(path)) = (log, &log_path) {
-            written = Some(log.finish().map_err(|e| wrong(path, &e))?);
+        if let Some(log) = log {
+            match log.finish() {
+                Ok(path) => written = Some(path),
+                // The run was: its summary is worth more than the error alone.
+                Err(error) => {
+                    let text = format!("the log cannot be finished: {error}");
+                    if end.failed {
+                        recorder.record.notes.push(text);
+                    } else {
+                        end = drive::End { text, failed: true };
+                    }
+                }
+            }
         }
         recorder.record.end.clone_from(&end.text);
         promise(control, &mut recorder);

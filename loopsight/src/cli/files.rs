@@ -6,7 +6,20 @@ use super::output;
 use crate::error::{Error, Result};
 use crate::{Log, Model, Session, files};
 
-pub(crate) use crate::files::writable;
+/// Refuses outputs that cannot be written, or that this command reads, before its work.
+pub(crate) fn check<'p>(
+    outputs: impl IntoIterator<Item = &'p PathBuf>,
+    inputs: &[&[PathBuf]],
+) -> Result<()> {
+    for output in outputs {
+        files::writable(output)?;
+        files::apart(
+            output,
+            inputs.iter().copied().flatten().map(PathBuf::as_path),
+        )?;
+    }
+    Ok(())
+}
 
 /// `[MODEL] LOG`, with further logs and one to judge on.
 pub(crate) fn session(names: &[PathBuf], also: &[PathBuf], test: Option<&Path>) -> Result<Session> {
@@ -33,10 +46,18 @@ pub(crate) fn session(names: &[PathBuf], also: &[PathBuf], test: Option<&Path>) 
     Ok(session)
 }
 
-/// Writes a text file, and says so.
+/// Writes a text file, and says so, and whether it replaced one.
 pub(crate) fn save(path: &Path, text: &str) -> Result<()> {
+    let replaced = path.exists();
     files::save(path, text)?;
-    wrote(path);
+    if replaced {
+        let shown = path.display();
+        output::note(&format!(
+            "wrote {shown} in place of the file that was there"
+        ));
+    } else {
+        wrote(path);
+    }
     Ok(())
 }
 

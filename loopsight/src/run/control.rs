@@ -68,6 +68,16 @@ impl Loop {
         Model::from_file(path)
     }
 
+    /// The loop file, as it was named.
+    pub(crate) fn file(&self) -> &Path {
+        Path::new(&self.file)
+    }
+
+    /// Where the model file is that the file names.
+    pub(crate) fn model_file(&self) -> PathBuf {
+        self.beside(&self.parsed.model)
+    }
+
     /// Period, s.
     pub fn period_s(&self) -> f64 {
         self.parsed.period_s

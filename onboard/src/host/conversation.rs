@@ -66,6 +66,33 @@ fn named(what: Unusable, configuration: &Configuration) -> String {
     }
 }
 
+/// What of a configuration may not change while a robot drives: its plant, its limits, its safety, how far it may
+/// learn; and a model beyond that range.
+#[cfg(unix)]
+fn changes(now: &Configuration, next: &Configuration) -> Result<(), Unusable> {
+    if next.plant != now.plant {
+        return Err(Unusable::Plant);
+    }
+    if next.controller.limit != now.controller.limit {
+        return Err(Unusable::Controller);
+    }
+    if next.safety != now.safety {
+        return Err(Unusable::Safety);
+    }
+    let within = |i: usize, value: f32| {
+        now.learning.as_ref().is_none_or(|learning| {
+            let low = learning.low.get(i).is_none_or(|low| value >= *low);
+            low && learning.high.get(i).is_none_or(|high| value <= *high)
+        })
+    };
+    let mut values = next.parameters.iter().enumerate();
+    let sized = next.parameters.len() == now.parameters.len();
+    if !sized || !values.all(|(i, value)| value.is_finite() && within(i, *value)) {
+        return Err(Unusable::Parameters);
+    }
+    Ok(())
+}
+
 impl Conversation {
     pub(super) fn new(line: Line, configuration: Configuration, period: f64) -> Self {
         Self {
@@ -121,12 +148,14 @@ impl Conversation {
         };
         self.line.say(&Request::Hello(hello))?;
         let (mut runs, mut interrupted) = (false, false);
+        let path = self.line.path().to_owned();
         let welcome = self.line.hear(|reply| {
             match reply {
                 Reply::Hello(welcome) if welcome.hello.session == session => {
                     return Some(Ok(welcome));
                 }
                 Reply::Log(Note::Runs) => runs = true,
+                Reply::Log(Note::Busy) => return Some(Err(LineError::Busy { line: path.clone() })),
                 Reply::Stopped { reason, .. } => interrupted = reason == Reason::HostRestarted,
                 _ => {}
             }
@@ -198,42 +227,53 @@ impl Conversation {
             return Ok(None);
         };
         let mut said = Ok(None);
-        while let Some(request) = door.asked() {
-            match (request, &self.welcome) {
-                (Request::Hello(hello), Some(welcome)) => {
-                    let session = hello.session;
-                    let hello = Hello {
-                        session,
-                        version: VERSION,
-                    };
-                    door.answer(&Reply::Log(Note::Runs));
-                    door.answer(&Reply::Hello(Welcome {
-                        hello,
-                        ..welcome.clone()
-                    }));
+        // One request per tick.
+        match (door.asked(), &self.welcome) {
+            (Some(Request::Hello(hello)), Some(welcome)) => {
+                let session = hello.session;
+                if hello.version == VERSION {
+                    door.greeted(session);
                 }
-                (
-                    Request::Configure {
-                        session,
-                        configuration,
-                    },
-                    _,
-                ) => {
+                let hello = Hello {
+                    session,
+                    version: VERSION,
+                };
+                door.answer(&Reply::Log(Note::Runs));
+                door.answer(&Reply::Hello(Welcome {
+                    hello,
+                    ..welcome.clone()
+                }));
+            }
+            (
+                Some(Request::Configure {
+                    session,
+                    configuration,
+                }),
+                _,
+            ) => {
+                let refused = |reason| Reply::Stopped {
+                    session,
+                    tick: 0,
+                    reason,
+                };
+                if !door.knows(session) {
+                    door.answer(&refused(Reason::OtherSession));
+                } else if let Err(what) = changes(&self.configuration, &configuration) {
+                    door.answer(&refused(Reason::Configuration(what)));
+                    let why = "another model was refused at the door while the robot drives";
+                    said = Ok(Some(format!("{why}: {what}")));
+                } else {
                     self.configuration = configuration;
                     let done = self.configure();
                     door.answer(&match &done {
                         Ok(()) => Reply::Configured { session },
-                        Err(error) => Reply::Stopped {
-                            session,
-                            tick: 0,
-                            reason: error.reason(),
-                        },
+                        Err(error) => refused(error.reason()),
                     });
                     said = done.map(|()| Some(self.changed()));
                 }
-                // Nobody but this run moves or stops the robot.
-                _ => {}
             }
+            // Nobody but this run moves or stops the robot.
+            _ => {}
         }
         self.door = Some(door);
         said

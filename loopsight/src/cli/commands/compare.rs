@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::words::report;
 
 pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
-    arguments.html.as_deref().map_or(Ok(()), files::writable)?;
+    files::check(&arguments.html, &[&arguments.files])?;
     let session = files::session(&arguments.files, &[], None)?;
     let bar = Bar::new();
     let options = CompareOptions::default()

@@ -8,7 +8,10 @@ use crate::error::Result;
 use crate::words::report;
 
 pub(crate) fn run(arguments: &DiagnoseArguments) -> Result<()> {
-    arguments.html.as_deref().map_or(Ok(()), files::writable)?;
+    files::check(
+        &arguments.html,
+        &[&arguments.files, &arguments.also, arguments.test.as_slice()],
+    )?;
     let session = files::session(&arguments.files, &arguments.also, arguments.test.as_deref())?;
     let bar = Bar::new();
     let options = DiagnoseOptions::default()

@@ -11,7 +11,10 @@ use crate::{Ask, ExperimentOptions, Model, Session};
 const NOTHING: &str = "nothing";
 
 pub(crate) fn run(arguments: &ExperimentArguments) -> Result<()> {
-    files::writable(&arguments.output)?;
+    files::check(
+        [&arguments.output],
+        &[std::slice::from_ref(&arguments.model)],
+    )?;
     let session = Session::of_model(Model::from_file(&arguments.model)?);
     let bar = Bar::new();
     let mut options = ExperimentOptions::default()

@@ -8,9 +8,11 @@ use crate::words::report;
 use crate::{FitOptions, Method, Scheme};
 
 pub(crate) fn run(arguments: &FitArguments) -> Result<()> {
-    for path in arguments.output.iter().chain(&arguments.html) {
-        files::writable(path)?;
-    }
+    let outputs = arguments.output.iter().chain(&arguments.html);
+    files::check(
+        outputs,
+        &[&arguments.files, &arguments.also, arguments.test.as_slice()],
+    )?;
     let session = files::session(&arguments.files, &arguments.also, arguments.test.as_deref())?;
     let bar = Bar::new();
     let options = FitOptions::default()

@@ -8,9 +8,11 @@ use crate::error::Result;
 use crate::words::report;
 
 pub(crate) fn run(arguments: &ImproveArguments) -> Result<()> {
-    for path in arguments.output.iter().chain(&arguments.html) {
-        files::writable(path)?;
-    }
+    let outputs = arguments.output.iter().chain(&arguments.html);
+    files::check(
+        outputs,
+        &[&arguments.files, &arguments.also, arguments.test.as_slice()],
+    )?;
     let session = files::session(&arguments.files, &arguments.also, arguments.test.as_deref())?;
     let bar = Bar::new();
     let options = ImproveOptions::default()

@@ -12,9 +12,9 @@ use crate::{LogTo, Loop, RunOptions, Session};
 pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
     let control = Loop::from_file(&arguments.file)?;
     let session = Session::of_model(control.model()?);
-    for path in arguments.html.iter().chain(&arguments.svg) {
-        files::writable(path)?;
-    }
+    let inputs = [arguments.file.clone(), control.model_file()];
+    let outputs = arguments.html.iter().chain(&arguments.svg);
+    files::check(outputs.chain(&arguments.output), &[&inputs])?;
     let dashboard = Arc::new(Mutex::new(Dashboard::new()));
     let shown = Arc::clone(&dashboard);
     let log = arguments.output.clone();

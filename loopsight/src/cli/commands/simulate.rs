@@ -7,7 +7,8 @@ use crate::error::Result;
 use crate::{Experiment, Model, Session, SimulateOptions};
 
 pub(crate) fn run(arguments: &SimulateArguments) -> Result<()> {
-    files::writable(&arguments.output)?;
+    let inputs = [&arguments.model, &arguments.experiment].map(std::slice::from_ref);
+    files::check([&arguments.output], &inputs)?;
     let session = Session::of_model(Model::from_file(&arguments.model)?);
     let experiment = Experiment::from_file(&arguments.experiment)?;
     let answer = session.simulate(&SimulateOptions::new(experiment))?;
