@@ -70,6 +70,7 @@
 //! |---|---|---|
 //! | `cli` | yes | the command: the binary `loopsight`, and `cli::run()` for crates with parts of their own |
 //! | `serial` | with `cli` | robots at the end of a serial line: `Session::send`, the driver `serial`, the controller `aboard` |
+//! | `all-formats` | no | logs in HDF5, MATLAB v7.3, Parquet, Arrow and SQLite, beside those that are always read |
 //! | `schema` | no | the module `schema`: JSON Schemas of the answers |
 //!
 //! `default-features = false` leaves a library without terminals and serial ports.
@@ -91,6 +92,7 @@ mod explain;
 mod files;
 mod fit;
 mod improve;
+mod inspect;
 mod list;
 mod log;
 mod model;
@@ -122,6 +124,7 @@ pub use experiment::{Ask, ExperimentOptions};
 pub use explain::explain;
 pub use fit::{FitOptions, Method, Scheme};
 pub use improve::ImproveOptions;
+pub use inspect::{InspectOptions, inspect};
 pub use list::{ListOptions, PartRole, list};
 pub use log::{Log, LogBuilder};
 pub use model::{Model, ModelValue};

@@ -25,8 +25,9 @@ pub struct Log {
 }
 
 impl Log {
-    /// Reads a log: CSV with units at the end of the names (`voltage_right_V`), SysId JSON, or an MCAP
-    /// file that a loop wrote. The content decides, not the name.
+    /// Reads a log: CSV with units at the end of the names (`voltage_right_V`), SysId JSON, or what other
+    /// programs write: WPILOG, ULog, MCAP, ROS 2 bags (the folder), MATLAB, NumPy, and with the feature
+    /// `all-formats` HDF5, Parquet, Arrow. The content decides, not the name; gzip and zstd are taken off.
     ///
     /// # Errors
     ///

@@ -11,6 +11,7 @@ pub fn all() -> Vec<(&'static str, Value)> {
     vec![
         of::<answers::AddAnswer>(),
         of::<answers::CheckAnswer>(),
+        of::<answers::InspectAnswer>(),
         of::<answers::CompareAnswer>(),
         of::<answers::DiagnoseAnswer>(),
         of::<answers::ExperimentAnswer>(),

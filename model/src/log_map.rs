@@ -17,6 +17,9 @@ pub struct LogMap {
     /// is `t`, with a unit of time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<ColumnMap>,
+    /// Time from one row to the next, s, of a log without time stamps.
+    #[serde(default, alias = "period", skip_serializing_if = "Option::is_none")]
+    pub period_s: Option<f64>,
     /// Column of a run number or name; rows with another value start a new run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run: Option<String>,

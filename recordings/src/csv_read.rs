@@ -105,6 +105,7 @@ pub(crate) fn parse_csv(text: &str, log: &str) -> Result<Table, RecordingError> 
         columns,
         runs: vec![run],
         labels,
+        ..Table::default()
     })
 }
 

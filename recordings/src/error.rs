@@ -5,6 +5,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use loopsight_core::unit::{Dimension, UnitError};
+use loopsight_formats::FormatError;
 
 /// Where in a log a value stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -260,6 +261,31 @@ pub enum RecordingError {
         /// All columns.
         columns: Box<[String]>,
     },
+    /// Channels without time stamps that do not belong to the same rows.
+    #[error(
+        "{log}: `{first}` has {rows} values and `{second}` has {found}; channels without time stamps must have the same number"
+    )]
+    ChannelLengths {
+        /// The file.
+        log: Box<str>,
+        /// One channel.
+        first: Box<str>,
+        /// Its values.
+        rows: usize,
+        /// Another.
+        second: Box<str>,
+        /// Its values.
+        found: usize,
+    },
+    /// A log of another program that cannot be read.
+    #[error(transparent)]
+    Format(Box<FormatError>),
+    /// A period that is none.
+    #[error("[log] period_s = {period}: expected a time above 0")]
+    BadPeriod {
+        /// What was given, s.
+        period: f64,
+    },
     /// The log has no signal of the plant.
     #[error(
         "{log}: no column is a signal of the model; the signals are {}; the columns are {}; name one under [log.measured]",
@@ -352,6 +378,20 @@ pub enum RecordingError {
         /// Values of the row.
         found: usize,
     },
+}
+
+impl From<FormatError> for RecordingError {
+    fn from(error: FormatError) -> Self {
+        match error {
+            FormatError::Io { path, message } => RecordingError::Io {
+                path,
+                action: "read",
+                message,
+            },
+            FormatError::Empty { log } => RecordingError::Empty { log },
+            other => RecordingError::Format(Box::new(other)),
+        }
+    }
 }
 
 /// `; did you mean …?`, or nothing.

@@ -41,6 +41,8 @@ pub enum FaultKind {
     UnsignedVoltage,
     /// A column that does not say its unit; SI was assumed.
     UnitAssumed,
+    /// A file that ends too early; what is before the cut was read.
+    CutLog,
 }
 
 impl FaultKind {
@@ -63,6 +65,7 @@ impl FaultKind {
             FaultKind::EmptyRun => "empty_run",
             FaultKind::UnsignedVoltage => "unsigned_voltage",
             FaultKind::UnitAssumed => "unit_assumed",
+            FaultKind::CutLog => "cut_log",
         }
     }
 }

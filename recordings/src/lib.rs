@@ -23,11 +23,13 @@
 //!
 //! [`write_csv`] and [`LogWriter`] write logs that read back to the same numbers.
 
+mod channels;
 mod csv_read;
 mod csv_write;
 mod error;
 mod fault;
 mod faults;
+mod inventory;
 mod map;
 mod mcap_log;
 mod model_file;
@@ -41,6 +43,8 @@ pub use csv_read::read_csv_from;
 pub use csv_write::{LogWriter, column, header, write_csv};
 pub use error::{Location, RecordingError};
 pub use fault::{Fault, FaultKind, Severity};
+pub use inventory::{ChannelFacts, ClockFacts, Inventory, UnitFact};
+pub use loopsight_formats::Kind;
 pub use map::{MappedSignal, Recording, map};
 pub use source::{Source, read, read_bytes};
 pub use sysid::{SysIdLog, SysIdRun, TestKind, read_sysid};

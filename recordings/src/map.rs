@@ -66,8 +66,8 @@ pub fn map(
     plant_signals: &[Signal],
     map: &LogMap,
 ) -> Result<Recording, RecordingError> {
-    let table = source.table();
-    let plan = Plan::new(&table, plant_inputs, plant_signals, map)?;
+    let (table, map) = source.table_for(plant_inputs, plant_signals, map)?;
+    let plan = Plan::new(&table, plant_inputs, plant_signals, &map)?;
     let mut mapper = Mapper::new(&table, &plan);
     for run in &table.runs {
         mapper.run(run)?;
@@ -85,6 +85,14 @@ pub fn map(
     found.extend(plan.notes.iter().cloned());
     let measured_ids: Vec<&str> = plan.measured.iter().map(|(_, m)| m.id.as_str()).collect();
     found.extend(faults::take_out_spikes(&mut recording, &measured_ids));
+    if !table.cut.is_empty() {
+        found.push(Fault {
+            kind: FaultKind::CutLog,
+            run: String::new(),
+            signal: String::new(),
+            detail: table.cut.clone(),
+        });
+    }
     let input_ids: Vec<&str> = plan.inputs.iter().map(|(_, id)| id.as_str()).collect();
     found.extend(faults::check(&recording, &input_ids, &table, &plan));
     found.sort_by_key(|fault| std::cmp::Reverse(fault.severity()));
@@ -205,7 +213,7 @@ impl<'a> Mapper<'a> {
         for at in range {
             let stamp = rows[at][time.column];
             self.check(run, at, time, stamp, "the time")?;
-            let shifted = (stamp - origin) * time.factor;
+            let shifted = self.exact((stamp - origin) * time.factor);
             self.limit(run, at, time, shifted)?;
             times.push((at, shifted));
         }
@@ -217,7 +225,10 @@ impl<'a> Mapper<'a> {
             let part_name = self.part_name(name);
             let time_of = |at: &usize| times[at - first_row].1;
             let start = part.first().map_or(0.0, time_of);
-            let times = part.iter().map(|at| time_of(at) - start).collect();
+            let times = part
+                .iter()
+                .map(|at| self.exact(time_of(at) - start))
+                .collect();
             let mut inputs = Rows::new(self.plan.inputs.len(), Vec::new());
             let mut measured = Rows::new(self.plan.measured.len(), Vec::new());
             for at in part {
@@ -230,6 +241,14 @@ impl<'a> Mapper<'a> {
             })?);
         }
         Ok(())
+    }
+
+    /// Stamps of other programs count nanoseconds or more: a difference of two loses none of them.
+    fn exact(&self, seconds: f64) -> f64 {
+        match self.table.own_clocks {
+            true => (seconds * 1e9).round() / 1e9,
+            false => seconds,
+        }
     }
 
     fn part_name(&mut self, name: &str) -> String {
@@ -395,7 +414,7 @@ impl<'a> Mapper<'a> {
         }
         for (at, (_, signal)) in self.plan.measured.iter().enumerate() {
             let (missing, absurd) = (&self.missing[at], &self.absurd[at]);
-            if missing.count > 0 {
+            if missing.count > 0 && !self.table.own_clocks {
                 let detail = format!(
                     "{} of {} samples are missing, the first at {}",
                     missing.count, self.rows, missing.first

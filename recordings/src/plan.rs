@@ -203,7 +203,7 @@ impl Finder<'_> {
     }
 
     fn time(&mut self, map: &LogMap) -> Result<Link, RecordingError> {
-        let wanted = "a column such as `time_s`".to_owned();
+        let wanted = "a column such as `time_s`, or `period_s` in the model's [log]".to_owned();
         if let Some(time) = &map.time {
             let (column, ending) = find(self.table, time.name())
                 .ok_or_else(|| self.missing("the time", "time", wanted, time.name()))?;

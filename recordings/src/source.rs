@@ -3,11 +3,15 @@
 use std::borrow::Cow;
 use std::path::Path;
 
+use loopsight_core::Signal;
+use loopsight_formats::{Format, FormatError, Input, Log};
+use loopsight_model::log_map::{ColumnMap, LogMap};
+
+use crate::channels;
 use crate::csv_read::parse_csv;
 use crate::error::RecordingError;
-use crate::mcap_log::{is_mcap, read_mcap};
 use crate::sysid::{SysIdLog, read_sysid};
-use crate::table::Table;
+use crate::table::{TIME, Table};
 
 /// A log as it stands in its file.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,43 +20,67 @@ pub enum Source {
     Table(Table),
     /// A SysId log: it says itself what was measured.
     SysId(SysIdLog),
+    /// A log of another program: channels, most of them with time stamps of their own.
+    Channels(Box<Log>),
 }
 
 impl Source {
-    /// The log as a table with units in the headers.
+    /// The log as a table with units in the headers; of a log of channels those that stand side by
+    /// side with the longest one.
     pub fn table(&self) -> Cow<'_, Table> {
         match self {
             Source::Table(table) => Cow::Borrowed(table),
             Source::SysId(log) => Cow::Owned(log.table()),
+            Source::Channels(log) => Cow::Owned(channels::table(log)),
         }
+    }
+
+    /// The table that a model needs, and the map of its columns.
+    pub(crate) fn table_for<'s>(
+        &'s self,
+        inputs: &[Signal],
+        signals: &[Signal],
+        map: &'s LogMap,
+    ) -> Result<(Cow<'s, Table>, Cow<'s, LogMap>), RecordingError> {
+        let (mut table, mut map) = match self {
+            Source::Channels(log) => {
+                let (table, map) = channels::prepare(log, inputs, signals, map)?;
+                (Cow::Owned(table), Cow::Owned(map))
+            }
+            _ => (self.table(), Cow::Borrowed(map)),
+        };
+        if let (Some(period), None) = (map.period_s, &map.time) {
+            table.to_mut().stamp(period)?;
+            map.to_mut().time = Some(ColumnMap::Name(TIME.to_owned()));
+        }
+        Ok((table, map))
     }
 
     /// A model file for a log that describes itself.
     pub fn model_toml(&self) -> Option<String> {
         match self {
-            Source::Table(_) => None,
+            Source::Table(_) | Source::Channels(_) => None,
             Source::SysId(log) => Some(log.model_toml()),
         }
     }
 }
 
-/// Reads a log: CSV with a header, SysId JSON, or an MCAP file that a loop wrote.
+/// Reads a log: CSV with a header, SysId JSON, or what [`loopsight_formats`] reads: a file, the
+/// folder of a ROS 2 bag, standard input as `-`; packed or not.
 ///
 /// # Errors
 ///
 /// [`RecordingError`] says what is wrong and where.
 pub fn read(path: &Path) -> Result<Source, RecordingError> {
-    if path.is_dir() {
-        return Err(RecordingError::Directory {
-            path: path.to_owned(),
-        });
-    }
-    let bytes = std::fs::read(path).map_err(|e| RecordingError::Io {
-        path: path.to_owned(),
-        action: "read",
-        message: e.to_string().into(),
-    })?;
-    read_bytes(&bytes, &path.display().to_string())
+    let folder = path.is_dir();
+    read_input(Input::open(path)).map_err(|error| match error {
+        RecordingError::Format(e) if folder && matches!(*e, FormatError::NotRead { .. }) => {
+            RecordingError::Directory {
+                path: path.to_owned(),
+            }
+        }
+        other => other,
+    })
 }
 
 /// Reads a log from the bytes of a file: as [`read`]; `log` stands for the file in messages.
@@ -61,9 +89,23 @@ pub fn read(path: &Path) -> Result<Source, RecordingError> {
 ///
 /// [`RecordingError`] says what is wrong and where.
 pub fn read_bytes(bytes: &[u8], log: &str) -> Result<Source, RecordingError> {
-    if is_mcap(bytes) {
-        return read_mcap(bytes, log).map(Source::Table);
+    read_input(Input::from_bytes(bytes.to_vec(), log))
+}
+
+fn read_input(input: Result<Input, FormatError>) -> Result<Source, RecordingError> {
+    let input = input?;
+    let name = input.name().to_owned();
+    if input.format() == Format::Text {
+        return read_text(&input.into_bytes()?, &name);
     }
+    let log = loopsight_formats::read(input)?;
+    Ok(match channels::own(&log) {
+        Some(table) => Source::Table(table),
+        None => Source::Channels(Box::new(log)),
+    })
+}
+
+fn read_text(bytes: &[u8], log: &str) -> Result<Source, RecordingError> {
     let text = as_text(bytes, log)?;
     match text.trim_start().chars().next() {
         Some('{') => read_sysid(text, log).map(Source::SysId),

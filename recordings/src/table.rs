@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use loopsight_core::unit::split_name;
 
-use crate::error::Location;
+use crate::error::{Location, RecordingError};
+
+/// Name of a column of time stamps that a file does not have.
+pub(crate) const TIME: &str = "time_s";
 
 /// Columns and rows of a log, in the units of the file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,6 +20,10 @@ pub struct Table {
     pub runs: Vec<TableRun>,
     /// Columns of words, by index: the number in a row is the index of the word here.
     pub labels: BTreeMap<usize, Vec<String>>,
+    /// The columns were measured at times of their own: what is missing in a row was never there.
+    pub own_clocks: bool,
+    /// Where and how the file ends too early; empty: it does not.
+    pub cut: String,
 }
 
 /// Header of one column.
@@ -70,6 +77,29 @@ impl Table {
     /// Headers, as in the file.
     pub fn column_texts(&self) -> Vec<String> {
         self.columns.iter().map(|c| c.text.clone()).collect()
+    }
+
+    /// Puts a column of time stamps before the others: a row every `period` seconds.
+    pub(crate) fn stamp(&mut self, period: f64) -> Result<(), RecordingError> {
+        if !(period.is_finite() && period > 0.0) {
+            return Err(RecordingError::BadPeriod { period });
+        }
+        for run in &mut self.runs {
+            let width = self.columns.len().max(1);
+            let rows = std::mem::take(&mut run.rows);
+            for (k, row) in rows.chunks_exact(width).enumerate() {
+                run.rows.push(k as f64 * period);
+                run.rows.extend(row);
+            }
+        }
+        // A column of that name that is not the time keeps its place, not its name.
+        for column in self.columns.iter_mut().filter(|c| c.text == TIME) {
+            column.text.push('\'');
+        }
+        self.columns.insert(0, ColumnName::new(TIME));
+        let labels = std::mem::take(&mut self.labels);
+        self.labels = labels.into_iter().map(|(at, w)| (at + 1, w)).collect();
+        Ok(())
     }
 
     /// Rows of a run as slices.

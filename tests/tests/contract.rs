@@ -102,6 +102,7 @@ fn every_answer_keeps_its_contract() {
     let plain = &series[..1];
     for (arguments, status, ways) in [
         (&["list"][..], 0, plain),
+        (&["inspect", "log.csv"], 0, plain),
         (&["explain", "ddmr"], 0, plain),
         (&["explain", "coulomb_friction"], 0, plain),
         (&["explain", "expression"], 0, plain),

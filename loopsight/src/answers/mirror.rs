@@ -133,6 +133,8 @@ mirror! {
         UnsignedVoltage,
         /// A column that does not say its unit; SI was assumed.
         UnitAssumed,
+        /// A file that ends too early; what is before the cut was read.
+        CutLog,
     }
 }
 

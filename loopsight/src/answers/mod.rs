@@ -15,6 +15,7 @@ mod explain;
 mod fit;
 mod force;
 mod improve;
+mod inspect;
 mod list;
 mod mirror;
 mod run;
@@ -40,6 +41,7 @@ pub use explain::{
 pub use fit::FitAnswer;
 pub use force::{ForceBin, ForceCurve, ForceDependence, MissingForce, WrittenForce};
 pub use improve::{ImproveAnswer, ImproveStep, OpenChoice};
+pub use inspect::{FittingPlant, InspectAnswer, InspectedChannel, MappedChannel};
 pub use list::{ListAnswer, Listed};
 pub use mirror::{Because, FaultKind, ParameterVerdict, Promise, Severity, Verdict};
 pub use run::RunAnswer;

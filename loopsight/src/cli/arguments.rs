@@ -24,6 +24,8 @@ pub(crate) enum Command {
     New(NewArguments),
     /// Check model, loop and experiment files, and logs, without doing anything with them.
     Check(CheckArguments),
+    /// Say what is in a log of any program, and write a model file for it.
+    Inspect(InspectArguments),
     /// List the known plants, effects, estimators, controllers and drivers.
     List(ListArguments),
     /// Explain one of them: equation, parameters, channels, reference, example.
@@ -77,6 +79,32 @@ pub(crate) struct CheckArguments {
     /// Model, loop or experiment files (TOML), or logs (CSV, SysId JSON).
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InspectArguments {
+    /// The log: CSV, SysId JSON, WPILOG, ULog, MCAP, the folder of a ROS 2 bag, MATLAB, NumPy, …; `-`: standard
+    /// input.
+    #[arg(value_name = "LOG")]
+    pub(crate) log: PathBuf,
+    /// Write a model file for it.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// The plant; by default the one that fits the channels best.
+    #[arg(long, value_name = "PLANT")]
+    pub(crate) plant: Option<String>,
+    /// The channel of an input; without ID that of the first one.
+    #[arg(long = "input", value_name = "[ID=]CHANNEL")]
+    pub(crate) inputs: Vec<String>,
+    /// The channel of a measured signal; without ID that of the first state.
+    #[arg(long = "measure", value_name = "[ID=]CHANNEL")]
+    pub(crate) measured: Vec<String>,
+    /// Time from one row to the next, s, of a log without time stamps.
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) period: Option<f64>,
     /// JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,

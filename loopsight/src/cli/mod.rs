@@ -59,6 +59,7 @@ fn execute(arguments: &Arguments) -> Result<()> {
     match &arguments.command {
         Command::New(options) => commands::new::run(options),
         Command::Check(options) => commands::check::run(options),
+        Command::Inspect(options) => commands::inspect::run(options),
         Command::List(options) => commands::list::run(options),
         Command::Explain(options) => commands::explain::run(options),
         Command::Simulate(options) => commands::simulate::run(options),

@@ -66,6 +66,7 @@ fn the_model_file_names_columns_units_and_scales() {
     let text = "stamp,run,u1,w\n0,1,2,3\n1,1,2.5,4\n0,2,2,3\n1,2,2.5,4\n";
     let log_map = LogMap {
         time: Some(column("stamp", Some("s"), 1.0)),
+        period_s: None,
         run: None, // a column named `run` is found
         inputs: BTreeMap::from([("voltage".into(), column("u1", Some("V"), -2.0))]),
         measured: BTreeMap::from([(
@@ -139,7 +140,7 @@ fn errors_name_the_nearest_and_all_columns() {
         (
             "tme_s,voltage_V,speed_rad_per_s\n0,1,2\n",
             &ok,
-            "log.csv: no column for the time `time` (a column such as `time_s`); did you mean `tme_s`?",
+            "log.csv: no column for the time `time` (a column such as `time_s`, or `period_s` in the model's [log]); did you mean `tme_s`?",
         ),
         (
             "time_s,voltage_V,speed_Hz\n0,1,2\n",

@@ -339,6 +339,7 @@ proptest! {
     #[test]
     fn the_other_tables_of_a_model(
         time in option::of(column()),
+        period_s in option::of(finite()),
         run in option::of(name()),
         inputs in btree_map(name(), column(), 0..3),
         measured in btree_map(name(), measured(), 0..3),
@@ -347,7 +348,7 @@ proptest! {
         fixed in vec(name(), 0..3),
     ) {
         same(&Tables {
-            log: LogMap { time, run, inputs, measured },
+            log: LogMap { time, period_s, run, inputs, measured },
             simulation: SimulationOptions { max_step_s },
             fit: FitOptions { free, fixed },
         })?;

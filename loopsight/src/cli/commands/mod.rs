@@ -11,6 +11,7 @@ pub(crate) mod experiment;
 pub(crate) mod explain;
 pub(crate) mod fit;
 pub(crate) mod improve;
+pub(crate) mod inspect;
 pub(crate) mod list;
 pub(crate) mod new;
 mod person;

@@ -1,0 +1,250 @@
+//! What is in a log of another program, and a model file for it.
+
+mod likely;
+mod toml;
+
+use loopsight_core::PlantMeta;
+use loopsight_model::registry;
+use loopsight_recordings::{ChannelFacts, Inventory, Kind};
+
+use crate::answers::{Answer, FittingPlant, InspectAnswer, InspectedChannel};
+use crate::error::{Error, Result};
+use crate::log::Log;
+use crate::model::Model;
+use crate::words;
+
+/// What is known of a log beforehand.
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub struct InspectOptions {
+    /// The plant; by default the one that fits the channels best.
+    pub plant: Option<String>,
+    /// Channels of the inputs: `voltage=drive/u`, or the channel of the first input alone.
+    pub inputs: Vec<String>,
+    /// Channels of the measured signals: `speed=drive/omega`, or the channel of the first state alone.
+    pub measured: Vec<String>,
+    /// Time from one row to the next, s, of a log without time stamps.
+    pub period_s: Option<f64>,
+}
+
+impl InspectOptions {
+    /// The plant.
+    #[must_use]
+    pub fn plant(mut self, id: impl Into<String>) -> Self {
+        self.plant = Some(id.into());
+        self
+    }
+
+    /// The channel of an input: `ID=CHANNEL`.
+    #[must_use]
+    pub fn input(mut self, channel: impl Into<String>) -> Self {
+        self.inputs.push(channel.into());
+        self
+    }
+
+    /// The channel of a measured signal: `ID=CHANNEL`.
+    #[must_use]
+    pub fn measure(mut self, channel: impl Into<String>) -> Self {
+        self.measured.push(channel.into());
+        self
+    }
+
+    /// Time from one row to the next, s.
+    #[must_use]
+    pub fn period_s(mut self, period: f64) -> Self {
+        self.period_s = Some(period);
+        self
+    }
+}
+
+/// Says what is in a log: format, channels with unit, rate and range, the plants of the library that fit
+/// them, and a model file to begin with.
+///
+/// ```
+/// use loopsight::{InspectOptions, Log, Model, inspect};
+///
+/// let text: String = (0..50).map(|k| format!("{},{},{}\n", 0.01 * k as f64, k % 7, 3 * k)).collect();
+/// let log = loopsight::Log::from_bytes("motor.csv", format!("t,u,omega\n{text}").as_bytes())?;
+/// let found = inspect(&log, &InspectOptions::default())?;
+/// assert_eq!(found.plants[0].plant, "dc_axis");
+/// let model = Model::from_toml("model.toml", found.model_toml.as_deref().unwrap_or_default())?;
+/// # Ok::<(), loopsight::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// A plant, an input or a channel that was named is not there.
+pub fn inspect(log: &Log, options: &InspectOptions) -> Result<InspectAnswer> {
+    let inventory = log.source.inventory();
+    let known = Known::new(&inventory, options)?;
+    let mut plants: Vec<(f64, FittingPlant)> = Vec::new();
+    for meta in registry::plants() {
+        if options.plant.as_deref().is_some_and(|id| id != meta.id) {
+            continue;
+        }
+        if let Some(found) = likely::fitting(meta, &inventory, &known)? {
+            plants.push(found);
+        } else if options.plant.is_some() {
+            return Err(unfit(log, meta));
+        }
+    }
+    // Of plants that fit alike, the simplest is tried first.
+    let parameters = |id: &str| {
+        let all = registry::plants();
+        let meta = all.iter().find(|meta| meta.id == id);
+        meta.map_or(0, |meta| meta.parameters.len())
+    };
+    plants.sort_by(|a, b| {
+        let simpler = parameters(&a.1.plant).cmp(&parameters(&b.1.plant));
+        b.0.total_cmp(&a.0).then(simpler)
+    });
+    let plants: Vec<FittingPlant> = plants.into_iter().map(|(_, plant)| plant).collect();
+    let state = state(&inventory).map(|c| c.path.clone());
+    let model_toml = match log.source.model_toml() {
+        Some(text) if options.plant.is_none() => Some(text),
+        _ => plants.first().map(|plant| {
+            let stamps = inventory
+                .channels
+                .iter()
+                .any(|c| c.clock.is_some() || c.is_time);
+            let period = toml::Period::new(stamps, options.period_s);
+            toml::model(
+                log.name(),
+                plant,
+                &inventory,
+                state.as_deref(),
+                period,
+                !known.measured.is_empty(),
+            )
+        }),
+    };
+    let mut answer = InspectAnswer {
+        schema: InspectAnswer::SCHEMA,
+        summary: String::new(),
+        file: log.name().to_owned(),
+        format: inventory.format.clone(),
+        duration_s: inventory.duration,
+        runs: inventory.runs,
+        state,
+        notes: inventory.notes.clone(),
+        channels: inventory.channels.iter().map(inspected).collect(),
+        plants,
+        model_toml,
+    };
+    answer.summary = summary(&answer);
+    Ok(answer)
+}
+
+/// What the caller said of the log.
+#[derive(Default)]
+struct Known {
+    inputs: Vec<(Option<String>, String)>,
+    measured: Vec<(Option<String>, String)>,
+}
+
+impl Known {
+    fn new(inventory: &Inventory, options: &InspectOptions) -> Result<Self> {
+        if let Some(id) = &options.plant {
+            Model::of_plant(id)?;
+        }
+        let split = |given: &String| -> Result<(Option<String>, String)> {
+            let paths = || inventory.channels.iter().map(|c| c.path.as_str());
+            let (id, name) = match given.split_once('=') {
+                Some((id, name)) if !paths().any(|p| p == given) => (Some(id.to_owned()), name),
+                _ => (None, given.as_str()),
+            };
+            let whole = paths().find(|path| *path == name);
+            let found = whole.or_else(|| {
+                let mut ends = paths().filter(|p| p.ends_with(name));
+                ends.next().filter(|_| ends.next().is_none())
+            });
+            match found {
+                Some(path) => Ok((id, path.to_owned())),
+                None => {
+                    let near = loopsight_model::config::nearest(name, paths());
+                    let near = near.map_or_else(String::new, |n| format!("; did you mean `{n}`?"));
+                    Err(Error::request(format!(
+                        "there is no channel `{name}`{near}"
+                    )))
+                }
+            }
+        };
+        let all = |given: &[String]| given.iter().map(split).collect::<Result<Vec<_>>>();
+        Ok(Self {
+            inputs: all(&options.inputs)?,
+            measured: all(&options.measured)?,
+        })
+    }
+}
+
+fn unfit(log: &Log, meta: &PlantMeta) -> Error {
+    let ids = |signals: &[loopsight_core::Signal]| {
+        let ids: Vec<&str> = signals
+            .iter()
+            .filter(|s| !s.optional)
+            .map(|s| s.id)
+            .collect();
+        ids.join(", ")
+    };
+    Error::request(format!(
+        "{}: no channel seems to be an input or a signal of `{}`; it needs the inputs {} and one of {}; \
+         say them with --input ID=CHANNEL and --measure ID=CHANNEL",
+        log.name(),
+        meta.id,
+        ids(meta.inputs),
+        ids(meta.states),
+    ))
+}
+
+/// The channel of texts that says which test runs.
+fn state(inventory: &Inventory) -> Option<&ChannelFacts> {
+    let is_state = |c: &&ChannelFacts| {
+        c.kind == Kind::Text && c.words.len() > 1 && c.path.to_lowercase().contains("test-state")
+    };
+    inventory.channels.iter().find(is_state)
+}
+
+fn inspected(channel: &ChannelFacts) -> InspectedChannel {
+    let clock = channel.clock.as_ref();
+    InspectedChannel {
+        path: channel.path.clone(),
+        kind: match channel.kind {
+            Kind::Number => "number",
+            Kind::Boolean => "boolean",
+            Kind::Text => "text",
+            Kind::Opaque => "opaque",
+        },
+        declared: channel.declared.clone(),
+        unit: channel.unit.as_ref().map(|u| u.unit.clone()),
+        unit_from: channel.unit.as_ref().map(|u| u.why),
+        values: channel.values,
+        missing: channel.missing as f64 / channel.values.max(1) as f64,
+        min: channel.range.map(|r| r.0),
+        max: channel.range.map(|r| r.1),
+        words: channel.words.clone(),
+        rate_hz: clock.filter(|c| c.period > 0.0).map(|c| 1.0 / c.period),
+        jitter_s: clock.map(|c| c.jitter),
+        gaps: clock.map_or(0, |c| c.gaps),
+        longest_gap_s: clock.map_or(0.0, |c| c.longest_gap),
+        backwards: clock.map_or(0, |c| c.backwards),
+    }
+}
+
+fn summary(answer: &InspectAnswer) -> String {
+    let mut text = format!("{}, {} channels", answer.format, answer.channels.len());
+    if let Some(duration) = answer.duration_s {
+        text.push_str(&format!(", {} s", words::number(duration)));
+    }
+    text.push('.');
+    if answer.runs > 1 {
+        text.push_str(&format!(" {} runs.", answer.runs));
+    }
+    if let Some(state) = &answer.state {
+        text.push_str(&format!(" The texts of `{state}` become runs."));
+    }
+    match answer.plants.first() {
+        Some(plant) => text.push_str(&format!(" `{}` fits its channels.", plant.plant)),
+        None => text.push_str(" No plant of the library fits its channels by their names."),
+    }
+    text
+}
