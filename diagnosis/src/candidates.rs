@@ -6,6 +6,7 @@ use loopsight_model::registry;
 use loopsight_model::sensor::Sensor;
 
 use crate::criteria::SearchCriteria;
+use crate::equivalent::{equivalent, preferred};
 use crate::positions::Positions;
 
 /// An effect at a set of channels.
@@ -145,7 +146,7 @@ pub(crate) fn candidates(
                 .effects
                 .iter()
                 .any(|e| e.meta.id == meta.id && e.at.iter().any(|c| at.contains(&c.id)));
-            if present {
+            if present || has_another_name(model, meta, &at) {
                 continue;
             }
             let contained = model.effects.iter().position(|e| {
@@ -242,6 +243,25 @@ pub(crate) fn smooth(model: &mut Model, count: usize, width: f64) -> bool {
         }
     }
     has
+}
+
+/// Whether an effect at a channel is one that the model has at an equivalent channel, or that is another
+/// candidate there, in the unit of an input.
+fn has_another_name(model: &Model, meta: &'static EffectMeta, at: &[&str]) -> bool {
+    let [id] = at else {
+        return false;
+    };
+    let channels = || model.plant.channels.iter();
+    let Some(channel) = channels().find(|c| c.id == *id) else {
+        return false;
+    };
+    let has = |other: &Channel| {
+        let mut effects = model.effects.iter().filter(|e| e.meta.id == meta.id);
+        effects.any(|e| e.at.iter().any(|c| c.id == other.id))
+    };
+    channels()
+        .filter(|other| misfit(other, meta).is_none() && equivalent(model, channel, other))
+        .any(|other| has(other) || preferred(model, other, channel))
 }
 
 pub(crate) fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<&'static str>> {

@@ -75,6 +75,7 @@ mod conclusion;
 pub mod criteria;
 mod derived;
 mod diagnose;
+mod equivalent;
 mod error;
 mod estimate;
 mod experiment;

@@ -74,6 +74,15 @@ impl Model {
         (0..nx).filter(|i| seen[*i]).collect()
     }
 
+    /// Rates of the states at the state `x` with the inputs `u` and the efforts `w`, without effects; of other
+    /// lengths than the plant's they are zero.
+    pub fn rates_at(&self, values: &[f64], x: &[f64], u: &[f64], w: &[f64]) -> Vec<f64> {
+        let mut rates = vec![0.0; x.len()];
+        let p = self.lower(values);
+        f64::dynamics(self.dynamics).derivative(x, u, w, &p, &mut rates);
+        rates
+    }
+
     /// Sensitivity of the states' rates to the states at `x`, without inputs and efforts.
     fn rate_jacobian(&self, values: &[f64], x: &[f64]) -> DMatrix<f64> {
         let (nx, nu) = (self.n_states(), self.plant.inputs.len());

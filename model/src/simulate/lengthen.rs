@@ -58,21 +58,26 @@ impl<S: HostReal> Simulator<'_, S> {
     /// II.4). It looks at values alone, so that a simulation and its derivatives take the same steps.
     pub(crate) fn advance_lengthened(&mut self, input: &[f64], span: f64, most: usize) {
         let Some(mut kept) = self.lengthened.take() else {
-            return self.integrate(input, span, most);
+            return self.integrate(input, span, most, true);
         };
         let mut steps = (kept.steps / 4).clamp(1, most);
         kept.before.clone_from(&self.x);
-        self.integrate(input, span, steps);
+        self.integrate(input, span, steps, false);
         while steps < most {
             kept.coarse.clone_from(&self.x);
             self.x.clone_from(&kept.before);
             steps = (2 * steps).min(most);
-            self.integrate(input, span, steps);
+            self.integrate(input, span, steps, false);
             if kept.agrees(&self.x) {
                 break;
             }
         }
         kept.steps = steps;
+        if !self.bounds.output_memory.is_empty() {
+            // The past of a sensor needs some points, too.
+            self.x.clone_from(&kept.before);
+            self.integrate(input, span, steps.max(FEW).min(most), true);
+        }
         self.lengthened = Some(kept);
     }
 }

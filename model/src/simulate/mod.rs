@@ -59,7 +59,7 @@ pub struct Simulator<'m, S> {
     /// Longest integration step, s.
     longest: f64,
     /// Steps longer than that where the samples are far apart and the motion allows them; none where the
-    /// file gives the step, or a past must be written down step by step.
+    /// file gives the step.
     lengthened: Option<Lengthened<S>>,
     /// How fast each input changes within the interval that is integrated, per second.
     slopes: Vec<f64>,
@@ -134,8 +134,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                 })
             })
             .collect();
-        let lengthened =
-            (!model.step_given && bounds.output_memory.is_empty()).then(|| Lengthened::new(size));
+        let lengthened = (!model.step_given).then(|| Lengthened::new(size));
         let mut simulator = Self {
             p: model.lower(values),
             values: values.to_vec(),
@@ -291,21 +290,22 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         if self.lengthens(steps) {
             self.advance_lengthened(input, span, steps);
         } else {
-            self.integrate(input, span, steps);
+            self.integrate(input, span, steps, true);
         }
         self.time = until;
         self.interval = span;
     }
 
-    /// Integrates over `span` in so many equal `steps`.
-    fn integrate(&mut self, input: &[f64], span: f64, steps: usize) {
+    /// Integrates over `span` in so many equal `steps`, and writes down the past of sensors that need one
+    /// where it is to `remember`.
+    fn integrate(&mut self, input: &[f64], span: f64, steps: usize, remember: bool) {
         let start = self.time;
         let h = span / steps as f64;
         for step in 0..steps {
             let elapsed = h * step as f64;
             self.apply(input, elapsed);
             self.step(start + elapsed, h);
-            if !self.bounds.output_memory.is_empty() {
+            if remember && !self.bounds.output_memory.is_empty() {
                 self.time = start + h * (step + 1) as f64;
                 self.refresh();
                 self.remember();
