@@ -254,10 +254,8 @@ fn words(path: &str) -> Vec<String> {
     let mut now = String::new();
     let mut lower = false;
     for c in path.chars() {
-        if !c.is_alphabetic() || (c.is_uppercase() && lower) {
-            if !now.is_empty() {
-                words.push(std::mem::take(&mut now));
-            }
+        if (!c.is_alphabetic() || (c.is_uppercase() && lower)) && !now.is_empty() {
+            words.push(std::mem::take(&mut now));
         }
         if c.is_alphabetic() {
             now.extend(c.to_lowercase());
