@@ -277,6 +277,20 @@ pub enum RecordingError {
         /// Its values.
         found: usize,
     },
+    /// Most rows are earlier than the one before.
+    #[error(
+        "{log}: time runs backwards: in `{column}` {back} of {rows} rows are earlier than the row before; sort the rows by time, or name another column as `time` in the model's [log]"
+    )]
+    TimeBackwards {
+        /// The file.
+        log: Box<str>,
+        /// The column of time stamps.
+        column: Box<str>,
+        /// Rows that are earlier than the one before.
+        back: usize,
+        /// All rows.
+        rows: usize,
+    },
     /// A log of another program that cannot be read.
     #[error(transparent)]
     Format(Box<FormatError>),

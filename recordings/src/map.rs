@@ -366,6 +366,15 @@ impl<'a> Mapper<'a> {
             .columns
             .get(self.plan.time.column)
             .map_or("", |c| c.text.as_str());
+        let back = self.backwards.count + self.restarts.count;
+        if back > 1 && 2 * back >= self.rows {
+            return Err(RecordingError::TimeBackwards {
+                log: self.table.source.as_str().into(),
+                column: time.into(),
+                back,
+                rows: self.rows,
+            });
+        }
         let mut push = |kind, run: String, signal: &str, detail: String| {
             faults.push(Fault {
                 kind,

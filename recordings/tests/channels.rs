@@ -148,3 +148,19 @@ fn rows_without_time_stamps_have_a_period() {
         .to_string();
     assert!(error.contains("expected a time above 0"), "{error}");
 }
+
+#[test]
+fn time_that_runs_backwards_throughout_is_refused() {
+    let rows: String = (0..40)
+        .rev()
+        .map(|k| format!("{},{},{}\n", 0.01 * f64::from(k), k % 7, k))
+        .collect();
+    let text = format!("time_s,voltage_V,speed_rad_per_s\n{rows}");
+    let source = read_bytes(text.as_bytes(), "back.csv").unwrap();
+    let error = map(&source, &INPUTS, &SIGNALS, &LogMap::default()).unwrap_err();
+    let error = error.to_string();
+    assert!(
+        error.starts_with("back.csv: time runs backwards: in `time_s` 39 of 40 rows"),
+        "{error}"
+    );
+}
