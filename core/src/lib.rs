@@ -81,6 +81,7 @@ mod signal;
 pub mod supervisor;
 mod tanh;
 mod tick;
+mod tie;
 pub mod unit;
 
 pub use array::Array;
@@ -102,6 +103,7 @@ pub use plant::{
 pub use real::Real;
 pub use signal::Signal;
 pub use tick::{Loop, Observation, Observer, Tick, TickError, TickRecord};
+pub use tie::{Tie, Unshown};
 
 /// What the macros need of this crate.
 #[doc(hidden)]

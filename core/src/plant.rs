@@ -1,6 +1,6 @@
 //! Plants: the static view authors write, and the object-safe view made from it.
 
-use crate::{Array, Channel, Derived, Parameter, Place, Real, Signal};
+use crate::{Array, Channel, Derived, Parameter, Place, Real, Signal, Unshown};
 
 /// What a plant says about itself.
 #[derive(Clone, Copy, Debug)]
@@ -167,6 +167,9 @@ pub trait Plant: PlantArrays + Sized + Send + Sync + 'static {
     /// Quantities that follow from the parameters.
     const DERIVED: &'static [Derived] = &[];
 
+    /// Parts that a recording may not show, and what their parameters are then.
+    const UNSHOWN: &'static [Unshown] = &[];
+
     /// Longest integration step where a model file gives none, s: a quarter of the fastest time
     /// constant that is usual, or less.
     const MAX_STEP_S: f64 = MAX_STEP_S;
@@ -244,6 +247,10 @@ pub trait Dynamics<S: Real>: Send + Sync {
     }
     /// See [`Plant::DERIVED`].
     fn derivable(&self) -> &'static [Derived] {
+        &[]
+    }
+    /// See [`Plant::UNSHOWN`].
+    fn unshown(&self) -> &'static [Unshown] {
         &[]
     }
     /// See [`Plant::derived`]; zero for parameters of another length.
@@ -329,6 +336,9 @@ macro_rules! declare_plant {
             }
             fn derivable(&self) -> &'static [$crate::Derived] {
                 <$plant as $crate::Plant>::DERIVED
+            }
+            fn unshown(&self) -> &'static [$crate::Unshown] {
+                <$plant as $crate::Plant>::UNSHOWN
             }
             fn derived(&self, index: usize, p: &[S]) -> S {
                 let Ok(p) = p.try_into() else {

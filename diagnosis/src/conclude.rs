@@ -142,7 +142,7 @@ fn determined(explanation: &Explanation, undetermined: f64) -> bool {
         | ParameterVerdict::Frozen
         | ParameterVerdict::Unfinished => true,
         ParameterVerdict::NotPinned => p.std_error.is_none_or(|e| e > undetermined * p.value.abs()),
-        ParameterVerdict::Good | ParameterVerdict::AtBound => false,
+        ParameterVerdict::Good | ParameterVerdict::AtBound | ParameterVerdict::Tied => false,
     };
     !explanation.parameters.values().all(says_nothing)
 }

@@ -17,6 +17,8 @@ pub enum ParameterVerdict {
     Flat,
     /// The interval is wider than the value.
     NotPinned,
+    /// Not shown by this recording: it follows from others, as the plant says.
+    Tied,
     /// Rests on the end of its admissible range.
     AtBound,
     /// The fit was cancelled before it could say.
@@ -32,6 +34,7 @@ impl ParameterVerdict {
             ParameterVerdict::Dead => "no influence on what is measured here",
             ParameterVerdict::Flat => "only a combination with other parameters is determined",
             ParameterVerdict::NotPinned => "interval wider than the value",
+            ParameterVerdict::Tied => "not shown here: it follows from others",
             ParameterVerdict::AtBound => "at the end of its range",
             ParameterVerdict::Unfinished => "the fit was cancelled",
         }

@@ -87,8 +87,9 @@ fn check(model: &Model, runs: &[Run]) -> Result<(), FitError> {
     let unknown: Vec<String> = model
         .parameters
         .iter()
-        .filter(|p| !p.free && p.value.is_none())
-        .map(|p| p.name.clone())
+        .enumerate()
+        .filter(|(i, p)| !p.free && p.value.is_none() && model.tie(*i).is_none())
+        .map(|(_, p)| p.name.clone())
         .collect();
     if !unknown.is_empty() {
         return Err(FitError::Unknown(unknown));

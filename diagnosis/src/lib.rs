@@ -113,6 +113,7 @@ mod stride;
 mod sufficiency;
 pub mod tracking;
 mod trial;
+mod unshown;
 mod where_it_fails;
 mod window;
 

@@ -23,6 +23,7 @@ use crate::progress::{Cancelled, Work};
 use crate::regression::batch;
 use crate::settings::{FitSettings, Method};
 use crate::solve::Effort;
+use crate::unshown::tied;
 
 /// Fits the free parameters and the initial states of all runs.
 ///
@@ -115,10 +116,12 @@ pub(crate) fn prepare<'a>(
     settings: &FitSettings,
     work: &Work<'_>,
 ) -> Result<Prepared<'a>, FitError> {
+    let model = tied(model, runs, &work.criteria().log);
     let mut prepared = Prepared {
-        model: Cow::Borrowed(model),
         runs: Cow::Borrowed(runs),
+        model: model.clone(),
     };
+    let model = &*model;
     let Some(mut values) = first_values(model, runs, settings, work)? else {
         return Ok(prepared);
     };
@@ -267,6 +270,28 @@ impl Problem<'_> {
                 interval95: None,
                 verdict: ParameterVerdict::Frozen,
             };
+            let gradient = fitted.tie_gradient(index);
+            if !gradient.is_empty() {
+                estimate.verdict = ParameterVerdict::Tied;
+                let by = |i: usize| self.free.iter().position(|f| *f == i);
+                let steps: Vec<(usize, f64)> = gradient
+                    .into_iter()
+                    .filter_map(|(i, slope)| by(i).map(|k| (k, slope * self.scales[k])))
+                    .collect();
+                let known = |k: usize| !flatness.dead[k] && !flatness.flat[k];
+                let variance: f64 = steps
+                    .iter()
+                    .flat_map(|a| steps.iter().map(move |b| (a, b)))
+                    .map(|((i, a), (j, b))| a * b * covariance[(*i, *j)])
+                    .sum();
+                if steps.iter().all(|(k, _)| known(*k)) && variance.is_finite() && !steps.is_empty()
+                {
+                    let error = variance.max(0.0).sqrt();
+                    estimate.std_error = Some(error);
+                    estimate.interval95 =
+                        Some([value - quantile * error, value + quantile * error]);
+                }
+            }
             if let Some(k) = self.free.iter().position(|i| *i == index) {
                 let error = covariance[(k, k)].max(0.0).sqrt() * self.scales[k];
                 let known = error.is_finite() && !flatness.dead[k] && !flatness.flat[k];

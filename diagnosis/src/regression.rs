@@ -98,11 +98,16 @@ pub(crate) fn batch(
         .iter()
         .map(|p| p.value.unwrap_or(0.0))
         .collect();
+    // A parameter that is tied to another one's row is in both: the row that says more of it counts.
+    let mut told = vec![0.0; values.len()];
     for (row, (gram, right)) in grams.iter().enumerate() {
         if let Some(inverse) = pseudo_inverse(gram) {
             let theta = inverse * right;
             for (k, j) in regression.parameters(row).iter().enumerate() {
-                values[*j] = theta[k];
+                if gram[(k, k)] >= told[*j] {
+                    told[*j] = gram[(k, k)];
+                    values[*j] = theta[k];
+                }
             }
         }
     }

@@ -58,7 +58,9 @@ impl Search<'_> {
                 let (judged, fit) = finish(first.clone(), self.nominal)?;
                 let explanation = explain(&judged, &fit, self.nominal).ok()?;
                 self.tell(Stage::Finalists, &done, of);
-                Some((judged, explanation))
+                // What its own fit brought to nothing explains nothing, however far the others moved.
+                let least = self.criteria().does_nothing;
+                does_something(&explanation, least).then_some((judged, explanation))
             })
             .collect();
         finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
@@ -199,6 +201,29 @@ impl Search<'_> {
         }
         attempts
     }
+}
+
+/// Whether any parameter that makes an effect large, one that is zero in a neutral effect, is above a share
+/// `least` of its noticeable size.
+fn does_something(explanation: &Explanation, least: f64) -> bool {
+    let model = &explanation.model;
+    let place = &explanation.place;
+    let own = model.effects.iter().filter(|effect| {
+        effect.meta.id == place.effect
+            && effect
+                .at
+                .iter()
+                .all(|c| place.at.iter().any(|at| at == c.id))
+    });
+    let mut sizes = own
+        .flat_map(|effect| {
+            let parameters = model.parameters.iter().skip(effect.first_parameter);
+            parameters.take(effect.meta.parameters.len())
+        })
+        .filter(|p| p.free && p.declaration.default == Some(0.0))
+        .peekable();
+    // An effect without such a parameter is neutral in another way.
+    sizes.peek().is_none() || sizes.any(|p| p.value.is_some_and(|v| v.abs() > least * p.scale()))
 }
 
 /// The least error among some candidates.

@@ -2,7 +2,7 @@
 
 use loopsight_core::Parameter;
 use loopsight_diagnosis::{Fit, FitSettings, fit};
-use loopsight_model::config::PathSegment;
+use loopsight_model::config::{PathSegment, TomlSource};
 use serde::Serialize;
 
 use crate::answers::FitAnswer;
@@ -147,7 +147,15 @@ impl Session {
                 Some((new.path.clone(), value))
             })
             .collect();
-        Ok(self.model.source()?.with_values(&values))
+        let text = self.model.source()?.with_values(&values);
+        let tied = fit.model.tied_names();
+        if tied.is_empty() {
+            return Ok(text);
+        }
+        Ok(match TomlSource::parse(&self.model.file, &text) {
+            Ok(valued) => valued.with_tied(&tied),
+            Err(_) => text,
+        })
     }
 }
 

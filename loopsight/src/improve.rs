@@ -106,10 +106,15 @@ fn improved_text(source: &TomlSource, before: &Composed, best: &Composed) -> Str
             pairs.extend(to.zip(from).take(effect.meta.parameters.len()));
         }
     }
+    let is_tied = best.tied_names();
     let values: Vec<(Vec<PathSegment>, f64)> = pairs
         .into_iter()
-        .filter(|(_, from)| from.free)
+        .filter(|(_, from)| from.free || is_tied.contains(&from.name.as_str()))
         .filter_map(|(to, from)| Some((to.path.clone(), from.value?)))
         .collect();
-    present.with_values(&values)
+    let text = present.with_values(&values);
+    match TomlSource::parse(&source.file, &text) {
+        Ok(valued) if !is_tied.is_empty() => valued.with_tied(&is_tied),
+        _ => text,
+    }
 }

@@ -172,8 +172,7 @@ impl Affine {
             return;
         }
         let model = &self.model;
-        let of_plant = &self.values[..model.n_plant_parameters];
-        f64::dynamics(model.dynamics).lower(model.set, of_plant, &mut self.p);
+        model.lower_into(&self.values, &mut self.p);
         if let Some(predictor) = &mut self.predictor {
             predictor.set_values(&self.values);
         }

@@ -6,6 +6,7 @@ mod error;
 mod file;
 mod parameter;
 mod signals;
+mod ties;
 
 use std::path::Path;
 
@@ -21,9 +22,11 @@ use crate::sensor::Sensor;
 pub use attached::{Attached, MeasuredSignal};
 pub use error::ModelError;
 pub use file::{FitOptions, ModelFile, SimulationOptions};
+pub use loopsight_core::{Tie, Unshown};
 pub use parameter::ModelParameter;
 pub(crate) use signals::signal_index;
 pub use signals::signals;
+use ties::Tied;
 
 /// A plant with effects, sensors and parameter values, checked.
 #[derive(Clone)]
@@ -47,6 +50,8 @@ pub struct Model {
     pub(crate) dynamics: &'static dyn AnyDynamics,
     pub(crate) set: usize,
     pub(crate) n_plant_parameters: usize,
+    /// Parameters that follow from others.
+    ties: Vec<Tied>,
 }
 
 impl std::fmt::Debug for Model {
@@ -149,7 +154,9 @@ impl Model {
             dynamics: ready.dynamics,
             set: values.set,
             n_plant_parameters,
+            ties: Vec::new(),
         };
+        model.tie_named(&file.fit.tied, source)?;
         let measured: Vec<(String, Sensor)> = file
             .log
             .measured
@@ -249,6 +256,7 @@ impl Model {
         for (parameter, value) in self.parameters.iter_mut().zip(values) {
             parameter.value = value.is_finite().then_some(*value);
         }
+        self.follow_ties();
     }
 
     /// How the `index`-th input runs between the samples of a log.
@@ -297,8 +305,15 @@ impl Model {
     /// When there are fewer values than the model has parameters.
     pub fn lower<S: HostReal>(&self, values: &[S]) -> Vec<S> {
         let mut p = vec![S::zero(); self.plant.parameters.len()];
-        S::dynamics(self.dynamics).lower(self.set, &values[..self.n_plant_parameters], &mut p);
+        self.lower_into(values, &mut p);
         p
+    }
+
+    /// As [`Model::lower`], without allocation.
+    pub(crate) fn lower_into<S: HostReal>(&self, values: &[S], p: &mut [S]) {
+        let of_plant = values.get(..self.n_plant_parameters).unwrap_or(values);
+        S::dynamics(self.dynamics).lower(self.set, of_plant, p);
+        ties::apply(&self.ties, p);
     }
 
     /// What follows from the plant's parameters at the model's values.

@@ -106,13 +106,15 @@ impl Regression {
             ));
         }
         let mut base = Vec::new();
-        for parameter in &model.parameters {
+        for (index, parameter) in model.parameters.iter().enumerate() {
             base.push(match (parameter.free, parameter.value) {
                 (true, _) if !parameter.declaration.linear => {
                     return Err(RegressionError::NotLinear(parameter.name.clone()));
                 }
                 (true, _) => 0.0,
                 (false, Some(value)) => value,
+                // It follows from others.
+                (false, None) if model.tie(index).is_some() => 0.0,
                 (false, None) => return Err(RegressionError::Unknown(parameter.name.clone())),
             });
         }
@@ -198,9 +200,7 @@ impl Regression {
     fn take_input(&mut self, span: Option<f64>, input: &[f64]) {
         self.input_now.copy_from_slice(input);
         if let Some(acting) = &mut self.acting {
-            let dynamics: &dyn Dynamics<f64> = f64::dynamics(self.model.dynamics);
-            let of_plant = &acting.values[..self.model.n_plant_parameters];
-            dynamics.lower(self.model.set, of_plant, &mut self.p);
+            self.model.lower_into(&acting.values, &mut self.p);
             acting.follow(&self.model, &self.p, span, &mut self.input_now);
         }
     }
@@ -240,13 +240,13 @@ impl Regression {
     /// one; with them that of the present values, or of those with parameter `unit` one scale more.
     fn rate(&mut self, x: &[f64], u: &[f64], unit: Option<usize>) {
         let dynamics: &dyn Dynamics<f64> = f64::dynamics(self.model.dynamics);
-        let (model, n) = (&self.model, self.model.n_plant_parameters);
+        let model = &self.model;
         if let Some(acting) = &mut self.acting {
             let kept = unit.map(|j| (j, acting.values[j]));
             if let Some((j, value)) = kept {
                 acting.values[j] = value + model.parameters[j].scale();
             }
-            dynamics.lower(model.set, &acting.values[..n], &mut self.p);
+            model.lower_into(&acting.values, &mut self.p);
             let (w, dx) = (&mut self.w, &mut self.dx);
             acting.rate(model, dynamics, (x, u), &self.p, w, dx);
             if let Some((j, value)) = kept {
@@ -258,7 +258,7 @@ impl Regression {
         if let Some(j) = unit {
             self.values[j] = 1.0;
         }
-        dynamics.lower(model.set, &self.values[..n], &mut self.p);
+        model.lower_into(&self.values, &mut self.p);
         dynamics.derivative(x, u, &self.w, &self.p, &mut self.dx);
     }
 

@@ -3,9 +3,11 @@
 mod tables;
 
 use crate::declare_plant;
-use loopsight_core::{ControlAffine, Parameterization, Plant, PlantMeta, Real};
+use loopsight_core::{ControlAffine, Derived, Parameterization, Plant, PlantMeta, Real, Unshown};
 
-use tables::{CHANNELS, INPUTS, INTEGRALS, LUMPED, OUTPUTS, PHYSICAL, STATES};
+use tables::{
+    CHANNELS, FEEDFORWARD, INPUTS, INTEGRALS, LUMPED, OUTPUTS, PHYSICAL, STATES, UNSHOWN,
+};
 
 /// Differential-drive mobile robot (DDMR) with DC motors, pose included.
 ///
@@ -128,6 +130,10 @@ impl Plant for Ddmr {
         controlled: &[0, 1],
     };
 
+    const DERIVED: &'static [Derived] = &FEEDFORWARD;
+
+    const UNSHOWN: &'static [Unshown] = &UNSHOWN;
+
     fn derivative<S: Real>(x: &[S; 6], u: &[S; 2], w: &[S; 4], p: &[S; 8]) -> [S; 6] {
         let [v, omega, heading, _, _, _] = *x;
         let [k_a, k_b, k_c, k_d, k_e, k_f, _, _] = *p;
@@ -163,6 +169,15 @@ impl Plant for Ddmr {
             9 => armature(x, u, p)[1],
             10 => omega * omega,
             _ => -v * omega,
+        }
+    }
+
+    fn derived<S: Real>(index: usize, p: &[S; 8]) -> S {
+        let [k_a, _, k_c, ..] = *p;
+        let two = S::of(2.0);
+        match index {
+            0 => -k_a / (two * k_c),
+            _ => S::of(1.0) / (two * k_c),
         }
     }
 

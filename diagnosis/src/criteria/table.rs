@@ -13,6 +13,8 @@ criteria! {
         run_s: f64 = 1.0 "s", Judgement: "a shorter free run is mostly its initial state";
         /// A sensor that has something new so many sampling periods apart repeats itself in between.
         repeats_periods: f64 = 1.5 "periods", Derived: "half-way between something new at every sample and at every other";
+        /// Share of the inputs in a combination of them, below which the part of the plant that it shows does not show.
+        unshown: f64 = 0.1 "1", Derived: "ten volts then leave one for that part: the dry friction of a drivetrain, which hides it";
     }
 
     /// Whether a model can be simulated from its inputs alone, or needs an observer.
@@ -75,6 +77,8 @@ criteria! {
         longest_s: f64 = 2.5 "s", Judgement: "of a level that no fit saw, a block says how a model extrapolates";
         /// Blocks that a run is divided into where their length allows.
         blocks: usize = 16 "1", Judgement: "four judging blocks in each run";
+        /// Samples at the start of a run that a fit sees in any case.
+        head: usize = 8 "1", Judgement: "the initial state of a few signals, each known to its noise";
         /// Every so many blocks one judges.
         every: usize = 4 "1", Convention: "a quarter for validation";
     }
@@ -113,6 +117,8 @@ criteria! {
         grown_starts: usize = 3 "1", Judgement: "time";
         /// Error over that of the same effect at another channel, beyond which it is there and not here.
         elsewhere: f64 = 1.1 "1", Judgement: "a tenth is more than chance gives";
+        /// Share of its noticeable size below which an effect that was fitted does nothing.
+        does_nothing: f64 = 0.01 "1", Judgement: "3 mV of friction, 0.1 ms of delay: nobody can measure it";
         /// Share of the plain error below which an effect is also tried with parameters of its own at each channel.
         worth_dividing: f64 = 0.8 "1", Judgement: "less was another effect's";
         /// Share of the cost that a regression at measured positions must promise to go below.

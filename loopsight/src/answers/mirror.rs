@@ -69,6 +69,8 @@ mirror! {
         Flat,
         /// The interval is wider than the value.
         NotPinned,
+        /// Not shown by this recording: it follows from others, as the plant says.
+        Tied,
         /// Rests on the end of its admissible range.
         AtBound,
         /// The fit was cancelled before it could say.

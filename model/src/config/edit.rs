@@ -47,6 +47,30 @@ impl TomlSource {
         document.to_string()
     }
 
+    /// The text with these parameters under `[fit] tied`, besides those that it has there.
+    pub fn with_tied(&self, names: &[&str]) -> String {
+        let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
+            return self.text.clone();
+        };
+        let fit = document
+            .entry("fit")
+            .or_insert(Item::Table(toml_edit::Table::new()));
+        let Some(fit) = fit.as_table_like_mut() else {
+            return self.text.clone();
+        };
+        let tied = fit
+            .entry("tied")
+            .or_insert(toml_edit::value(toml_edit::Array::new()));
+        if let Some(list) = tied.as_array_mut() {
+            for name in names {
+                if !list.iter().any(|known| known.as_str() == Some(name)) {
+                    list.push(*name);
+                }
+            }
+        }
+        document.to_string()
+    }
+
     /// The text without its `index`-th `[[effect]]`.
     pub fn without_effect(&self, index: usize) -> String {
         let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {

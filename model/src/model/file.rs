@@ -49,4 +49,7 @@ pub struct FitOptions {
     /// Held though declared as estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<String>,
+    /// What the plant says they are where no recording shows them ([`Unshown`](loopsight_core::Unshown)).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tied: Vec<String>,
 }

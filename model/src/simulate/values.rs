@@ -12,8 +12,7 @@ impl<S: HostReal> Simulator<'_, S> {
         let model: &Model = &self.model;
         if values.len() == self.values.len() {
             self.values.copy_from_slice(values);
-            let of_plant = &self.values[..model.n_plant_parameters];
-            S::dynamics(model.dynamics).lower(model.set, of_plant, &mut self.p);
+            model.lower_into(&self.values, &mut self.p);
         }
     }
 

@@ -1,6 +1,6 @@
 //! What the robot declares: parameters, signals and channels.
 
-use loopsight_core::{Channel, Parameter, Place, Reads, Role, Signal};
+use loopsight_core::{Channel, Derived, Parameter, Place, Reads, Role, Signal, Tie, Unshown};
 
 pub(super) const LUMPED: [Parameter; 8] = [
     Parameter::new(
@@ -441,4 +441,56 @@ pub(super) const CHANNELS: [Channel; 14] = [
         size: 1.0,
         doc: "the left wheel's encoder, behind every signal that is made from its counts",
     },
+];
+
+/// A vehicle whose sides are alike and do not feel each other obeys `v_i' = K_A v_i + 2 K_C V_i` on each
+/// of them: then `K_D = K_A` and `K_F = K_C/b`. That is the case where the inertia about the axle is that
+/// of the mass at the wheels, `I + m d² = m b²`, and it is what WPILib's SysId assumes of a drivetrain.
+pub(super) const UNSHOWN: [Unshown; 2] = [
+    Unshown {
+        what: "turning",
+        shown_by: &[("voltage_right", 1.0), ("voltage_left", -1.0)],
+        ties: &[
+            Tie {
+                parameter: "K_D",
+                factors: &[("K_A", 1)],
+            },
+            Tie {
+                parameter: "K_F",
+                factors: &[("K_C", 1), ("half_track", -1)],
+            },
+        ],
+        because: "each side moved alone",
+    },
+    Unshown {
+        what: "driving straight",
+        shown_by: &[("voltage_right", 1.0), ("voltage_left", 1.0)],
+        ties: &[
+            Tie {
+                parameter: "K_A",
+                factors: &[("K_D", 1)],
+            },
+            Tie {
+                parameter: "K_C",
+                factors: &[("K_F", 1), ("half_track", 1)],
+            },
+        ],
+        because: "each side moved alone",
+    },
+];
+
+/// The terms of a feedforward for driving straight, per volt on each motor.
+pub(super) const FEEDFORWARD: [Derived; 2] = [
+    Derived::new(
+        "kV",
+        "V s/m",
+        "-K_A/(2 K_C)",
+        "voltage on each motor per forward speed",
+    ),
+    Derived::new(
+        "kA",
+        "V s^2/m",
+        "1/(2 K_C)",
+        "voltage on each motor per forward acceleration",
+    ),
 ];

@@ -53,6 +53,7 @@ pub fn said(diagnosis: &Diagnosis) -> Said {
             vec!["What was tried until then allows no conclusion.".to_owned()],
         ),
     };
+    because.extend(diagnosis.model.iter().flat_map(super::fit::not_shown));
     because.extend(
         diagnosis
             .observer

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use loopsight_diagnosis::{Estimate, Fit, Method, ParameterVerdict};
+use loopsight_model::model::{Model, Unshown};
 
 use super::comparison;
 use super::number::{error, number};
@@ -20,11 +21,13 @@ pub fn summary(fit: &Fit) -> Vec<String> {
                     verdict,
                     ParameterVerdict::Good
                         | ParameterVerdict::Frozen
+                        | ParameterVerdict::Tied
                         | ParameterVerdict::Unfinished
                 )
             })
             .map(|(verdict, names)| format!("{}: {}.", names.join(", "), verdict.text())),
     );
+    said.extend(not_shown(&fit.model));
     said.extend(fit.flat.iter().map(|flat| not_determined(flat) + "."));
     said
 }
@@ -41,6 +44,24 @@ pub fn not_converged(fit: &Fit) -> Option<String> {
         "the fit did not converge: {reason}; tried: {}",
         tried.join(", ")
     ))
+}
+
+/// The parts of a plant that a log does not show, and what they were taken for.
+pub(crate) fn not_shown(model: &Model) -> Vec<String> {
+    let sentence = |part: &Unshown| {
+        let ties: Vec<String> = part
+            .ties
+            .iter()
+            .map(|tie| format!("{} = {tie}", tie.parameter))
+            .collect();
+        format!(
+            "The log shows nothing of {}: {} were taken for it, as if {}.",
+            part.what,
+            ties.join(" and "),
+            part.because
+        )
+    };
+    model.tied_parts().map(sentence).collect()
 }
 
 /// How the error fell, and what it is on a test log where there is one.

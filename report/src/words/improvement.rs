@@ -45,6 +45,7 @@ pub fn said(improvement: &Improvement) -> Said {
         error(end.nrmse_test)
     )];
     because.push(rest(improvement.verdict, &error(last.floor.nrmse)));
+    because.extend((improvement.best.iter()).flat_map(|best| fit::not_shown(&best.model)));
     because.extend(
         last.observer
             .as_ref()
@@ -146,7 +147,10 @@ fn not_pinned(improvement: &Improvement, added: &[EffectAt]) -> Option<String> {
 fn doubtful(verdict: ParameterVerdict) -> bool {
     !matches!(
         verdict,
-        ParameterVerdict::Good | ParameterVerdict::Frozen | ParameterVerdict::Unfinished
+        ParameterVerdict::Good
+            | ParameterVerdict::Frozen
+            | ParameterVerdict::Tied
+            | ParameterVerdict::Unfinished
     )
 }
 
