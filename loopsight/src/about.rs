@@ -15,6 +15,8 @@ pub(crate) struct About {
     pub(crate) test: Option<String>,
     /// Sentences that belong beside the numbers.
     pub(crate) notes: Vec<String>,
+    /// The unit of a SysId log, and what it is for the model (m or rad).
+    pub(crate) sysid: Option<(String, f64)>,
 }
 
 impl About {

@@ -149,6 +149,53 @@ impl Log {
         }
     }
 
+    /// The log without the runs of these names, as the log has them or as faults name them (`#1` where they
+    /// have none).
+    ///
+    /// # Errors
+    ///
+    /// There is no such run, or none is left.
+    pub fn without_runs(self, names: &[&str]) -> Result<Self> {
+        if names.is_empty() {
+            return Ok(self);
+        }
+        let all: Vec<String> = match &self.source {
+            Source::SysId(log) => log.runs.iter().map(|run| run.name.clone()).collect(),
+            Source::Table(table) => table.runs.iter().map(|run| run.name.clone()).collect(),
+            // One recording of a session: a model's `[log]` cuts it.
+            Source::Channels(_) => vec![String::new()],
+        };
+        let named = |index: usize, run: &str| match run {
+            "" => format!("#{}", index + 1),
+            name => name.to_owned(),
+        };
+        let known: Vec<String> = (all.iter().enumerate())
+            .map(|(index, run)| named(index, run))
+            .collect();
+        if let Some(missing) = names.iter().find(|name| !known.iter().any(|k| k == *name)) {
+            return Err(Error::request(format!(
+                "{} has no run `{missing}`: its runs are {}",
+                self.name,
+                known.join(", ")
+            )));
+        }
+        if known.iter().all(|run| names.contains(&run.as_str())) {
+            return Err(Error::request(format!(
+                "{}: no run is left without {}",
+                self.name,
+                names.join(", ")
+            )));
+        }
+        let mut log = self;
+        let mut kept = known.iter().map(|run| !names.contains(&run.as_str()));
+        match &mut log.source {
+            Source::SysId(sysid) => sysid.runs.retain(|_| kept.next().unwrap_or(true)),
+            Source::Table(table) => table.runs.retain(|_| kept.next().unwrap_or(true)),
+            Source::Channels(_) => {}
+        }
+        Ok(log)
+    }
+
     /// Writes the log as CSV, whole or not at all. Several runs are told apart by a column `run` with their
     /// numbers.
     ///

@@ -49,6 +49,8 @@ pub(crate) struct Data {
     pub(crate) runs: Arc<[Run]>,
     pub(crate) test: Option<(String, Arc<[Run]>)>,
     pub(crate) faults: Vec<Fault>,
+    /// The unit of a SysId log, and what it is for the model (m or rad).
+    sysid: Option<(String, f64)>,
 }
 
 impl Data {
@@ -96,7 +98,12 @@ impl Session {
         let mut session = Self::of_model(model);
         let mut measuring = session.model.composed.clone();
         let (runs, faults) = matched(&mut measuring, &log)?;
+        let sysid = match &log.source {
+            Source::SysId(sysid) => Some((sysid.units.clone(), sysid.unit_of_model())),
+            _ => None,
+        };
         session.data = Some(Data {
+            sysid,
             model: measuring,
             runs: runs.into(),
             test: None,
@@ -195,6 +202,7 @@ impl Session {
             model_file: (!self.described).then(|| self.model.file.clone()),
             log: data.log.clone(),
             test: data.test.as_ref().map(|(name, _)| name.clone()),
+            sysid: data.sysid.clone(),
             ..About::default()
         }
     }

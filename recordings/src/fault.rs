@@ -37,12 +37,16 @@ pub enum FaultKind {
     ShortRun,
     /// A run without rows.
     EmptyRun,
+    /// A run that is not of the same machine in the same state as the others.
+    BrokenRun,
     /// Voltages logged as magnitudes; their signs were reconstructed.
     UnsignedVoltage,
     /// A column that does not say its unit; SI was assumed.
     UnitAssumed,
     /// A file that ends too early; what is before the cut was read.
     CutLog,
+    /// A length that cannot be.
+    Implausible,
 }
 
 impl FaultKind {
@@ -63,9 +67,11 @@ impl FaultKind {
             FaultKind::GyroScale => "gyro_scale",
             FaultKind::ShortRun => "short_run",
             FaultKind::EmptyRun => "empty_run",
+            FaultKind::BrokenRun => "broken_run",
             FaultKind::UnsignedVoltage => "unsigned_voltage",
             FaultKind::UnitAssumed => "unit_assumed",
             FaultKind::CutLog => "cut_log",
+            FaultKind::Implausible => "implausible",
         }
     }
 }
@@ -104,7 +110,8 @@ pub struct Fault {
 
 impl Fault {
     /// How much it matters. A fault of a column that the model does not use is never fatal, nor
-    /// is one that only some runs have.
+    /// is one that only some runs have, but for a run that is broken: it would be explained by physics
+    /// that is not there.
     pub fn severity(&self) -> Severity {
         // Ids of signals carry no unit, headers do.
         let unused_column = split_name(&self.signal).1.is_some();
@@ -114,6 +121,7 @@ impl Fault {
             | FaultKind::IrregularTime
             | FaultKind::UnsignedVoltage
             | FaultKind::UnitAssumed => Severity::Note,
+            FaultKind::BrokenRun => Severity::Fatal,
             FaultKind::DeadSensor
             | FaultKind::Motionless
             | FaultKind::ReversedSign

@@ -75,7 +75,7 @@ fn quantile(sorted: &[f64], q: f64) -> f64 {
 }
 
 /// The magnitude that 98 % of the values do not exceed: a maximum that ignores outliers.
-fn large(values: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn large(values: impl Iterator<Item = f64>) -> f64 {
     let mut magnitudes: Vec<f64> = values.map(f64::abs).filter(|v| v.is_finite()).collect();
     magnitudes.sort_by(f64::total_cmp);
     quantile(&magnitudes, 0.98)

@@ -3,16 +3,65 @@
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
+use crate::fault::{Fault, FaultKind};
 use crate::sysid::{SysIdLog, TestKind};
 
 /// Half track, m, where the data do not tell it.
 const GUESSED_HALF_TRACK: f64 = 0.3;
 /// Wheel radius, m, where the units are no length: the three inches of most such robots.
-const GUESSED_WHEEL_RADIUS: f64 = 0.0762;
+pub(crate) const GUESSED_WHEEL_RADIUS: f64 = 0.0762;
 /// Half tracks, m, outside of which something is wrong with the units.
 const PLAUSIBLE_HALF_TRACK: std::ops::RangeInclusive<f64> = 0.1..=1.0;
 
+/// Wheel radii, m, outside of which something is wrong with the units: from a toy to a tractor.
+const PLAUSIBLE_RADIUS: std::ops::RangeInclusive<f64> = 0.01..=1.0;
+
 impl SysIdLog {
+    /// What of the geometry in the log cannot be: the half track from wheels against gyro, the wheel radius
+    /// from the units per rotation. The first does not matter as long as only speeds of the wheels are
+    /// measured; the second is the unit of every speed.
+    pub(crate) fn implausible(&self) -> Vec<Fault> {
+        let mut found = Vec::new();
+        let fault = |signal: &str, detail: String| Fault {
+            kind: FaultKind::Implausible,
+            run: String::new(),
+            signal: signal.into(),
+            detail,
+        };
+        if !self.test.is_drivetrain() {
+            return found;
+        }
+        let radius = self.metres_per_rotation().map(|metres| metres / TAU);
+        if let Some(radius) = radius.filter(|radius| !PLAUSIBLE_RADIUS.contains(radius)) {
+            found.push(fault(
+                "wheel_radius",
+                format!(
+                    "{radius:.3e} m, from {} {} per rotation: speeds and positions are in another unit than the log \
+                     says. Voltages, times and what is late are right all the same",
+                    self.units_per_rotation, self.units
+                ),
+            ));
+        }
+        if let Some((half_track, _)) = self.half_track()
+            && !self.half_track_is_plausible()
+        {
+            found.push(fault(
+                "half_track",
+                format!(
+                    "{:.3e} m, from the wheels against the gyro: unitsPerRotation or the gyro's unit is wrong. \
+                     {GUESSED_HALF_TRACK} m was taken for it",
+                    half_track.abs()
+                ),
+            ));
+        }
+        found
+    }
+
+    fn half_track_is_plausible(&self) -> bool {
+        let half_track = self.half_track();
+        half_track.is_none_or(|(b, _)| PLAUSIBLE_HALF_TRACK.contains(&b.abs()))
+    }
+
     /// A commented model file for this log.
     pub fn model_toml(&self) -> String {
         // A comment must stay on its line, whatever the file is called.
@@ -54,19 +103,24 @@ impl SysIdLog {
         }
         line(text, &format!("wheel_radius = {radius:?} # m"));
         match self.half_track() {
-            Some((half_track, turned)) => {
+            Some((half_track, turned)) if self.half_track_is_plausible() => {
                 let half_track = half_track.abs();
                 line(
                     text,
                     &format!("# From the wheels against the gyro, {turned:.1} rad turned."),
                 );
-                if !PLAUSIBLE_HALF_TRACK.contains(&half_track) {
-                    line(
-                        text,
-                        "# Implausible: look at unitsPerRotation and the gyro's unit.",
-                    );
-                }
                 line(text, &format!("half_track = {half_track:.4} # m"));
+            }
+            Some((half_track, _)) => {
+                line(
+                    text,
+                    &format!(
+                        "# A guess: {:.3e} m from the wheels against the gyro is implausible. Look at",
+                        half_track.abs()
+                    ),
+                );
+                line(text, "# unitsPerRotation and the gyro's unit.");
+                line(text, &format!("half_track = {GUESSED_HALF_TRACK:?} # m"));
             }
             None => {
                 line(

@@ -18,6 +18,7 @@ use serde_json::{Map, Value};
 
 use crate::error::{RecordingError, nearest};
 
+mod broken;
 mod view;
 
 /// The mechanism that was tested.

@@ -10,6 +10,7 @@ use super::common::{
     Correction, EffectAt, Estimates, Failing, LogFault, Recommendation, SignalError, all, estimates,
 };
 use super::diagnose::{judged_context, pictures, two_series};
+use super::feedforward::Feedforward;
 use super::force::MissingForce;
 use super::mirror::Verdict;
 use super::series::Series;
@@ -35,6 +36,9 @@ pub struct ImproveAnswer {
     /// What follows from the plant's parameters, by name; absent where nothing does.
     #[serde(skip_serializing_if = "Estimates::is_empty")]
     pub derived: Estimates,
+    /// What SysId would make of it, in V and the log's own units; absent for a log that is none of SysId's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feedforward: Option<Feedforward>,
     /// Combinations of parameters that the data do not determine, in words.
     pub flat: Vec<String>,
     /// Errors of the best model by signal, on the test log where there is one.
@@ -144,6 +148,8 @@ impl ImproveAnswer {
             verdict: engine.verdict.into(),
             parameters: best.map_or_else(Estimates::new, |best| estimates(&best.parameters)),
             derived: best.map_or_else(Estimates::new, |best| estimates(&best.derived)),
+            feedforward: (best.zip(about.sysid.as_ref()))
+                .and_then(|(best, (units, size))| Feedforward::of(best, units, *size)),
             flat: best.map_or_else(Vec::new, |best| best.flat.clone()),
             signals,
             where_it_fails,
@@ -159,6 +165,12 @@ impl ImproveAnswer {
             about,
             shown,
         };
+        if let Some(feedforward) = &this.feedforward {
+            for sentence in feedforward.sentences() {
+                this.summary.push(' ');
+                this.summary.push_str(&sentence);
+            }
+        }
         if with_series {
             let (before, after) = (this.before(), this.after());
             this.series = Some(two_series(before.as_ref(), after.as_ref()));

@@ -131,12 +131,16 @@ mirror! {
         ShortRun,
         /// A run without rows.
         EmptyRun,
+        /// A run that is not of the same machine in the same state as the others.
+        BrokenRun,
         /// Voltages logged as magnitudes; their signs were reconstructed.
         UnsignedVoltage,
         /// A column that does not say its unit; SI was assumed.
         UnitAssumed,
         /// A file that ends too early; what is before the cut was read.
         CutLog,
+        /// A length that cannot be.
+        Implausible,
     }
 }
 

@@ -12,6 +12,7 @@ mod compare;
 mod diagnose;
 mod experiment;
 mod explain;
+mod feedforward;
 mod fit;
 mod force;
 mod improve;
@@ -38,6 +39,7 @@ pub use explain::{
     ExplainAnswer, Explained, ExplainedChannel, ExplainedDerived, ExplainedHome,
     ExplainedParameter, ExplainedSet, ExplainedSignal,
 };
+pub use feedforward::{Feedback, Feedforward};
 pub use fit::FitAnswer;
 pub use force::{ForceBin, ForceCurve, ForceDependence, MissingForce, WrittenForce};
 pub use improve::{ImproveAnswer, ImproveStep, OpenChoice};

@@ -158,6 +158,9 @@ pub(crate) struct CompareArguments {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
+    /// Leave this run of the log out, by its name; may be given again.
+    #[arg(long, value_name = "RUN")]
+    pub(crate) without: Vec<String>,
     /// JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
@@ -178,6 +181,9 @@ pub(crate) struct FitArguments {
     /// A further recording of the same machine to learn from, beside LOG; may be given again.
     #[arg(long, value_name = "LOG3")]
     pub(crate) also: Vec<PathBuf>,
+    /// Leave this run of the log out, by its name; may be given again.
+    #[arg(long, value_name = "RUN")]
+    pub(crate) without: Vec<String>,
     /// Judge the fitted model on this log, which it was not fitted to.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,
@@ -226,6 +232,9 @@ pub(crate) struct DiagnoseArguments {
     /// A further recording of the same machine to learn from, beside LOG; may be given again.
     #[arg(long, value_name = "LOG3")]
     pub(crate) also: Vec<PathBuf>,
+    /// Leave this run of the log out, by its name; may be given again.
+    #[arg(long, value_name = "RUN")]
+    pub(crate) without: Vec<String>,
     /// Judge on this log; without it, on parts of LOG that the fits do not see.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,
@@ -296,6 +305,9 @@ pub(crate) struct ImproveArguments {
     /// A further recording of the same machine to learn from, beside LOG; may be given again.
     #[arg(long, value_name = "LOG3")]
     pub(crate) also: Vec<PathBuf>,
+    /// Leave this run of the log out, by its name; may be given again.
+    #[arg(long, value_name = "RUN")]
+    pub(crate) without: Vec<String>,
     /// Judge on this log; without it, on parts of LOG that the fits do not see.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,

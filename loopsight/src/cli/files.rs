@@ -21,12 +21,21 @@ pub(crate) fn check<'p>(
     Ok(())
 }
 
-/// `[MODEL] LOG`, with further logs and one to judge on.
-pub(crate) fn session(names: &[PathBuf], also: &[PathBuf], test: Option<&Path>) -> Result<Session> {
+/// `[MODEL] LOG`, without some of its runs, with further logs and one to judge on.
+pub(crate) fn session(
+    names: &[PathBuf],
+    also: &[PathBuf],
+    without: &[String],
+    test: Option<&Path>,
+) -> Result<Session> {
+    let read = |log: &PathBuf| -> Result<Log> {
+        let runs: Vec<&str> = without.iter().map(String::as_str).collect();
+        Log::read(log)?.without_runs(&runs)
+    };
     let mut session = match names {
         [model, log] => {
             let model = Model::from_file(model)?;
-            Session::new(model, Log::read(log)?)?
+            Session::new(model, read(log)?)?
         }
         [log] if log.extension().is_some_and(|e| e == "toml") => {
             return Err(Error::request(format!(
@@ -34,7 +43,7 @@ pub(crate) fn session(names: &[PathBuf], also: &[PathBuf], test: Option<&Path>) 
                 log.display()
             )));
         }
-        [log] => Session::of_log(Log::read(log)?)?,
+        [log] => Session::of_log(read(log)?)?,
         _ => return Err(Error::request("expected a model file and a log")),
     };
     for log in also {
@@ -58,6 +67,21 @@ pub(crate) fn save(path: &Path, text: &str) -> Result<()> {
     } else {
         wrote(path);
     }
+    Ok(())
+}
+
+/// Where nothing was fitted: writes the model that a log brought which describes itself, so that a sign, a
+/// unit or a length can be put right in it.
+pub(crate) fn save_described(path: &Path, session: &Session) -> Result<()> {
+    if !session.described {
+        return Ok(());
+    }
+    files::save(path, session.model().to_toml())?;
+    output::note(&format!(
+        "wrote {}, the model as the log describes it: what is wrong with the log can be put right there \
+         (`scale = -1` turns a signal's sign), and the file given before the log",
+        path.display()
+    ));
     Ok(())
 }
 

@@ -6,6 +6,7 @@ use loopsight_core::unit::parse;
 
 use super::{OLD_WIDTH, SysIdLog, SysIdRun};
 use crate::fault::{Fault, FaultKind};
+use crate::model_file::GUESSED_WHEEL_RADIUS;
 use crate::table::{ColumnName, Table, TableRun};
 
 impl SysIdLog {
@@ -68,12 +69,7 @@ impl SysIdLog {
                 "duty",
             ]
         };
-        // The shaft of a lift turns, too: its length per rotation does not matter here.
-        let turn = match self.metres_per_rotation() {
-            Some(metres) if self.test.is_drivetrain() => metres,
-            Some(_) => TAU,
-            None => self.unit_in("rad").unwrap_or(TAU),
-        };
+        let turn = self.turn();
         let mixed = self.runs.iter().any(|run| run.width == OLD_WIDTH)
             && self.runs.iter().any(|run| run.width == 9);
         let columns: Vec<usize> = match (self.is_old_format(), mixed) {
@@ -105,6 +101,26 @@ impl SysIdLog {
             columns: columns.iter().map(|c| ColumnName::new(names[*c])).collect(),
             runs: self.runs.iter().map(table_run).collect(),
             ..Table::default()
+        }
+    }
+
+    /// What a rotation is in the table: m for a drivetrain in units of length, rad for all else.
+    fn turn(&self) -> f64 {
+        // The shaft of a lift turns, too: its length per rotation does not matter here.
+        match self.metres_per_rotation() {
+            Some(metres) if self.test.is_drivetrain() => metres,
+            Some(_) => TAU,
+            None => self.unit_in("rad").unwrap_or(TAU),
+        }
+    }
+
+    /// What one of the log's units is for the model of [`SysIdLog::model_toml`]: m for a drivetrain, with the
+    /// wheel radius guessed there where the log counts no lengths; rad for all else.
+    pub fn unit_of_model(&self) -> f64 {
+        let of_table = self.turn() / self.units_per_rotation;
+        match self.metres_per_rotation() {
+            None if self.test.is_drivetrain() => of_table * GUESSED_WHEEL_RADIUS,
+            _ => of_table,
         }
     }
 
@@ -150,6 +166,8 @@ impl SysIdLog {
                 ),
             });
         }
+        notes.extend(self.implausible());
+        notes.extend(self.broken_runs());
         notes
     }
 

@@ -51,6 +51,7 @@ mod advice;
 pub mod comparison;
 pub mod diagnosis;
 mod faults;
+pub mod feedforward;
 pub mod fit;
 mod force;
 pub mod improvement;

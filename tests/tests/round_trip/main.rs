@@ -350,7 +350,11 @@ proptest! {
         same(&Tables {
             log: LogMap { time, period_s, run, inputs, measured },
             simulation: SimulationOptions { max_step_s },
-            fit: FitOptions { free, fixed },
+            fit: FitOptions {
+                free,
+                fixed,
+                tied: Vec::new(),
+            },
         })?;
     }
 }

@@ -9,7 +9,7 @@ use crate::words::report;
 
 pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     files::check(&arguments.html, &[&arguments.files])?;
-    let session = files::session(&arguments.files, &[], None)?;
+    let session = files::session(&arguments.files, &[], &arguments.without, None)?;
     let bar = Bar::new();
     let options = CompareOptions::default()
         .series(arguments.series)

@@ -12,7 +12,12 @@ pub(crate) fn run(arguments: &DiagnoseArguments) -> Result<()> {
         &arguments.html,
         &[&arguments.files, &arguments.also, arguments.test.as_slice()],
     )?;
-    let session = files::session(&arguments.files, &arguments.also, arguments.test.as_deref())?;
+    let session = files::session(
+        &arguments.files,
+        &arguments.also,
+        &arguments.without,
+        arguments.test.as_deref(),
+    )?;
     let bar = Bar::new();
     let options = DiagnoseOptions::default()
         .series(arguments.series)

@@ -13,7 +13,12 @@ pub(crate) fn run(arguments: &FitArguments) -> Result<()> {
         outputs,
         &[&arguments.files, &arguments.also, arguments.test.as_slice()],
     )?;
-    let session = files::session(&arguments.files, &arguments.also, arguments.test.as_deref())?;
+    let session = files::session(
+        &arguments.files,
+        &arguments.also,
+        &arguments.without,
+        arguments.test.as_deref(),
+    )?;
     let bar = Bar::new();
     let options = FitOptions::default()
         .method(match arguments.method {
@@ -28,6 +33,9 @@ pub(crate) fn run(arguments: &FitArguments) -> Result<()> {
         .watch(bar.watch());
     let answer = session.fit(&options);
     drop(bar);
+    if let (Some(path), Err(_)) = (&arguments.output, &answer) {
+        files::save_described(path, &session)?;
+    }
     let answer = answer?;
     let test = arguments
         .test

@@ -13,7 +13,12 @@ pub(crate) fn run(arguments: &ImproveArguments) -> Result<()> {
         outputs,
         &[&arguments.files, &arguments.also, arguments.test.as_slice()],
     )?;
-    let session = files::session(&arguments.files, &arguments.also, arguments.test.as_deref())?;
+    let session = files::session(
+        &arguments.files,
+        &arguments.also,
+        &arguments.without,
+        arguments.test.as_deref(),
+    )?;
     let bar = Bar::new();
     let options = ImproveOptions::default()
         .series(arguments.series)
@@ -21,13 +26,17 @@ pub(crate) fn run(arguments: &ImproveArguments) -> Result<()> {
     let answer = session.improve(&options);
     drop(bar);
     let answer = answer?;
-    output::answer(
-        &answer,
-        &report::improvement::text(&answer.engine),
-        arguments.json,
-    )?;
-    if let (Some(path), Some(model)) = (&arguments.output, answer.model()) {
-        files::save(path, model.to_toml())?;
+    let mut text = report::improvement::text(&answer.engine);
+    for sentence in answer.feedforward.iter().flat_map(|f| f.sentences()) {
+        text.push_str(&sentence);
+        text.push('\n');
+    }
+    output::answer(&answer, &text, arguments.json)?;
+    if let Some(path) = &arguments.output {
+        match answer.model() {
+            Some(model) => files::save(path, model.to_toml())?,
+            None => files::save_described(path, &session)?,
+        }
     }
     if let Some(path) = &arguments.html {
         files::save(path, &answer.page(&output::command_line()))?;
