@@ -180,7 +180,9 @@ fn campaign(robots: usize, ticks: u64) {
         for used in [Use::Watched, Use::Taught, Use::Supervised] {
             let outcomes = all(estimator, used);
             let farthest = outcomes.iter().map(|o| o.farthest).fold(0.0, f64::max);
-            let beyond = |scales: f64| outcomes.iter().filter(|o| !(o.farthest <= scales)).count();
+            // An estimate that is no number is beyond everything.
+            let within = |o: &&Outcome, scales: f64| o.farthest <= scales;
+            let beyond = |scales: f64| outcomes.iter().filter(|o| !within(o, scales)).count();
             let stops: Vec<&String> = outcomes.iter().filter_map(|o| o.stopped.as_ref()).collect();
             let ratios: Vec<f64> = outcomes
                 .iter()
