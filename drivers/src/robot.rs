@@ -53,6 +53,8 @@ impl Robot {
             ));
         }
         model.max_step = step(settings.step_s, model.max_step)?;
+        // A robot is the truth: its steps are never lengthened.
+        model.step_given = true;
         let noise = noise(settings, &model)?;
         let limits = limits(settings.limit.as_ref(), &model)?;
         let mut random = ChaCha8Rng::seed_from_u64(settings.seed);

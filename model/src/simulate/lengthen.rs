@@ -3,8 +3,10 @@
 use super::Simulator;
 use crate::registry::HostReal;
 
-/// Steps per sample up to which nothing is gained by longer ones.
-const FEW: usize = 8;
+/// Steps per sample up to which the usual ones are taken: they cost little, and keep their digits.
+const MANY: usize = 100;
+/// Points of the past that a sensor needs in an interval.
+const PAST: usize = 8;
 /// Difference between a step and two of half its length, relative to the largest value of a state so far.
 /// The two are off by a fifteenth of it.
 const TOLERANCE: f64 = 1e-5;
@@ -31,22 +33,27 @@ impl<S: HostReal> Lengthened<S> {
     }
 
     /// Whether two steps of half the length come to the same place, `now`.
-    fn agrees(&mut self, now: &[S]) -> bool {
-        let states = self.size.iter_mut().zip(&self.coarse).zip(now);
-        let mut agrees = true;
-        for ((size, coarse), now) in states {
+    fn agrees(&self, now: &[S]) -> bool {
+        // Steps that are too long for a stiff model leave every measure, and what is not finite agrees with nothing.
+        let mut states = self.size.iter().zip(&self.coarse).zip(now);
+        states.all(|((size, coarse), now)| {
             let (coarse, now) = (coarse.value(), now.value());
-            *size = size.max(now.abs());
-            agrees &= (coarse - now).abs() <= TOLERANCE * *size;
+            now.is_finite() && (coarse - now).abs() <= TOLERANCE * size.max(now.abs())
+        })
+    }
+
+    /// The states that are kept: the largest so far are the measure of what follows.
+    fn keep(&mut self, now: &[S]) {
+        for (size, now) in self.size.iter_mut().zip(now) {
+            *size = size.max(now.value().abs());
         }
-        agrees
     }
 }
 
 impl<S: HostReal> Simulator<'_, S> {
     /// Whether an interval of so many usual steps is integrated with longer ones where they do.
     pub(crate) fn lengthens(&self, usual: usize) -> bool {
-        usual > FEW && self.lengthened.is_some()
+        usual > MANY && self.lengthened.is_some()
     }
 
     /// Integrates over `span` with as few steps as the motion allows and no more than `most`: as few that
@@ -73,10 +80,11 @@ impl<S: HostReal> Simulator<'_, S> {
             }
         }
         kept.steps = steps;
+        kept.keep(&self.x);
         if !self.bounds.output_memory.is_empty() {
             // The past of a sensor needs some points, too.
             self.x.clone_from(&kept.before);
-            self.integrate(input, span, steps.max(FEW).min(most), true);
+            self.integrate(input, span, steps.max(PAST).min(most), true);
         }
         self.lengthened = Some(kept);
     }
