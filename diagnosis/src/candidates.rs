@@ -259,8 +259,15 @@ fn has_another_name(model: &Model, meta: &'static EffectMeta, at: &[&str]) -> bo
         let mut effects = model.effects.iter().filter(|e| e.meta.id == meta.id);
         effects.any(|e| e.at.iter().any(|c| c.id == other.id))
     };
+    // Where a part of the plant does not show and is tied, an effort of the whole is one at its inputs.
+    let tied = !model.tied_names().is_empty();
+    let same = |other: &Channel| {
+        let efforts = [channel, other].map(|c| matches!(c.place, Place::Effort(_)));
+        let whole = tied && efforts == [true; 2] && preferred(model, other, channel);
+        whole || equivalent(model, channel, other)
+    };
     channels()
-        .filter(|other| misfit(other, meta).is_none() && equivalent(model, channel, other))
+        .filter(|other| misfit(other, meta).is_none() && same(other))
         .any(|other| has(other) || preferred(model, other, channel))
 }
 

@@ -94,7 +94,24 @@ impl Evidence<'_> {
     fn earned(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
         let unseen = advantage(self.unseen, &judged.losses, &self.criteria().window);
-        unseen > criteria.beats || (unseen > 0.0 && explanation.significance > criteria.certain)
+        unseen > criteria.beats
+            || (unseen > 0.0 && explanation.significance > criteria.certain)
+            || self.shown_by_starts(judged, explanation)
+    }
+
+    /// Whether the starts of the runs show it. They judge nothing, since the initial state needs them, and often
+    /// have the only steps: an effect that acts in them makes what judges no better. It must make that no worse,
+    /// and what is left there must be more than noise.
+    fn shown_by_starts(&self, judged: &Judged, explanation: &Explanation) -> bool {
+        let criteria = self.missing();
+        let explained = (self.nominal_fit.powi(2) - explanation.nrmse_fit.powi(2))
+            .max(0.0)
+            .sqrt();
+        self.nominal.holdout.test.is_none()
+            && self.above_floor(self.error())
+            && nrmse(&judged.losses) <= criteria.no_worse * self.error()
+            && explanation.significance > criteria.certain
+            && explained > (criteria.matters * self.floor_fit).max(self.least)
     }
 
     /// Whether the chosen explanation is what is missing: significantly better than no effect, by enough to
@@ -111,7 +128,7 @@ impl Evidence<'_> {
         let matters = complete || explained > (criteria.matters * self.floor).max(self.least);
         self.earned(judged, explanation)
             && explanation.significance > criteria.significant
-            && matters
+            && (matters || self.shown_by_starts(judged, explanation))
             && determined(explanation, criteria.undetermined)
     }
 

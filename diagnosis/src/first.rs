@@ -18,8 +18,9 @@ use crate::floor::noise;
 /// ```
 ///
 /// the start stays where it was measured instead of making up for missing physics. `σ` is what noise and
-/// resolution leave of the signal, or what the first sample is off the line through the two that follow:
-/// an absurd reading holds nobody. (The prior of a start is that of a Kalman filter, L. Ljung, 1999,
+/// resolution leave of the signal, or what the first sample is off the line through the two that follow (an
+/// absurd reading holds nobody), or how far the signal moves while a measurement may still be under way: the
+/// state of a run that is cut out of a motion is not what a late sensor says of its first instant. (The prior of a start is that of a Kalman filter, L. Ljung, 1999,
 /// "System Identification", 2nd edition, section 4.3.)
 pub(crate) fn first_weights(model: &Model, runs: &[Run], criteria: &Criteria) -> Vec<Vec<f64>> {
     let known: Vec<(f64, f64)> = (model.measured.iter().enumerate())
@@ -41,7 +42,11 @@ fn of_run(run: &Run, signal: usize, (noise, std): (f64, f64), criteria: &StartCr
     let [a, b, c] = [0, 1, 2].map(|k| run.sample(k)[signal]);
     // White noise of variance `σ²` has `6 σ²` in second differences.
     let off = (a - 2.0 * b + c).abs() / 6f64.sqrt();
-    let weight = criteria.wrong * std / noise.max(off);
+    let late = (run.time().iter().zip(0..))
+        .take_while(|(t, _)| **t <= criteria.late_s)
+        .map(|(_, k)| (run.sample(k)[signal] - a).abs())
+        .fold(0.0, f64::max);
+    let weight = criteria.wrong * std / noise.max(off).max(late);
     if off.is_nan() || weight.is_nan() {
         1.0
     } else {
@@ -71,6 +76,9 @@ mod tests {
         let mut spike = vec![1.0; 10];
         spike[0] = 7.0;
         assert_eq!(of(&run(spike), 0.01), 1.0);
+        // A run that is cut out of a motion.
+        let moving = run((0..10).map(|k| f64::from(k) * 0.1).collect());
+        assert_eq!(of(&moving, 0.001), 1.0);
         let mut missing = vec![1.0; 10];
         missing[0] = f64::NAN;
         assert_eq!(of(&run(missing), 0.01), 1.0);

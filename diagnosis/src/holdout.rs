@@ -24,11 +24,9 @@ pub(crate) struct Holdout<'a> {
 impl<'a> Holdout<'a> {
     /// With `test`, the fits see all of `runs`, and `test` judges.
     ///
-    /// Without, each run is cut into blocks of time, and one in every few judges: other blocks in each run.
-    /// The free run goes on through these blocks, so that delays, friction and slow changes are judged in motion
-    /// and over the whole length. The first block is that of the initial state, and often the only one with a
-    /// step: of two runs that begin alike the fits see one, and the other judges, but for the few samples that
-    /// the initial state needs.
+    /// Without, each run is cut into blocks of time, and one in every few judges: other blocks in each run,
+    /// and never the first, which the initial state needs. The free run goes on through these blocks, so that
+    /// delays, friction and slow changes are judged in motion and over the whole length.
     pub(crate) fn new(
         model: &Model,
         runs: &'a [Run],
@@ -36,23 +34,22 @@ impl<'a> Holdout<'a> {
         criteria: &HoldoutCriteria,
     ) -> Self {
         let every = criteria.every.max(2);
-        let block = |run: &Run| {
-            (run.duration() / criteria.blocks as f64)
-                .max(criteria.shortest_s)
-                .min(criteria.longest_s)
-        };
         let seen = test.is_none().then(|| {
-            let starts = judging_starts(runs, block);
             runs.iter()
                 .enumerate()
                 .map(|(index, run)| {
-                    let block = block(run);
-                    let judges = |k: usize, t: f64| match (t / block) as usize {
-                        0 => starts[index] && k >= criteria.head,
-                        number => number.wrapping_add(index).is_multiple_of(every),
-                    };
-                    let times = run.time().iter().enumerate();
-                    times.map(|(k, t)| !judges(k, *t)).collect()
+                    let block = (run.duration() / criteria.blocks as f64)
+                        .max(criteria.shortest_s)
+                        .min(criteria.longest_s);
+                    run.time()
+                        .iter()
+                        .map(|t| {
+                            t < &block
+                                || !((t / block) as usize)
+                                    .wrapping_add(index)
+                                    .is_multiple_of(every)
+                        })
+                        .collect()
                 })
                 .collect::<Vec<Vec<bool>>>()
         });
@@ -111,31 +108,6 @@ impl<'a> Holdout<'a> {
             .map(|(loss, _)| *loss)
             .collect()
     }
-}
-
-/// By run, whether its first block judges: every other one, those with most motion in it first. Alone in a
-/// log, it never does.
-fn judging_starts(runs: &[Run], block: impl Fn(&Run) -> f64) -> Vec<bool> {
-    let moved = |run: &Run| -> f64 {
-        let of_start = run.time().partition_point(|t| *t < block(run));
-        (0..run.n_measured())
-            .map(|signal| {
-                let mut tally = Tally::default();
-                for k in 0..of_start {
-                    tally.add(run.sample(k)[signal], 0.0);
-                }
-                let spread = tally.std();
-                if spread.is_finite() { spread } else { 0.0 }
-            })
-            .sum()
-    };
-    let mut by_motion: Vec<(f64, usize)> = (runs.iter().map(moved)).zip(0..).collect();
-    by_motion.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut judging = vec![false; runs.len()];
-    for (_, index) in by_motion.iter().skip(1).step_by(2) {
-        judging[*index] = true;
-    }
-    judging
 }
 
 /// How well a solution does.

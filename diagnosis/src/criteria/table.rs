@@ -35,6 +35,8 @@ criteria! {
         wrong: f64 = 0.1 "1", Judgement: "a model worth to be improved leaves about a tenth";
         /// Most that the first sample of a run may count, in samples.
         most: f64 = 100.0 "1", Judgement: "beyond it a start is as good as given";
+        /// How late a measurement may be, s: a start is known no better than the signal moves in that time.
+        late_s: f64 = 0.15 "s", Judgement: "the latest measurement of a real machine that was seen is 0.135 s late";
         /// Error of a fit above which other starts are tried as well.
         poor: f64 = 0.1 "1", Judgement: "a fit that leaves less has arrived, whatever is missing";
         /// Error above which seeded random starts are among them.
@@ -77,8 +79,6 @@ criteria! {
         longest_s: f64 = 2.5 "s", Judgement: "of a level that no fit saw, a block says how a model extrapolates";
         /// Blocks that a run is divided into where their length allows.
         blocks: usize = 16 "1", Judgement: "four judging blocks in each run";
-        /// Samples at the start of a run that a fit sees in any case.
-        head: usize = 8 "1", Judgement: "the initial state of a few signals, each known to its noise";
         /// Every so many blocks one judges.
         every: usize = 4 "1", Convention: "a quarter for validation";
     }
@@ -157,6 +157,8 @@ criteria! {
         significant: f64 = 4.0 "standard errors", Judgement: "as sure as on unseen data, with one more parameter";
         /// With so much significance it need only be no worse on unseen data.
         certain: f64 = 5.0 "standard errors", Convention: "five sigma: an effect that shows in transients alone leaves few samples to judge by";
+        /// Unseen error over that of the plain model up to which an effect that shows in the starts of the runs is accepted.
+        no_worse: f64 = 1.05 "1", Judgement: "what is judged holds few samples of what the effect does, and the chance of as many";
         /// What it explains, over the floor, to matter.
         matters: f64 = 0.2 "floors", Judgement: "less is lost in the noise of any use";
         /// Error over the floor below which an explanation explains everything.
