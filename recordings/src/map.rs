@@ -480,12 +480,10 @@ fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
         .collect();
     let (what, all_short) = (list.join(", "), names.len() == runs.len());
     let shorter = format!("shorter than {SHORT_RUN} s: {what}");
-    let detail = if all_short {
-        format!("every run is {shorter}")
-    } else if keep {
-        format!("{shorter}; kept, since nothing moves in the longer runs")
-    } else {
-        format!("{shorter}; left out")
+    let detail = match (all_short, keep) {
+        (true, _) => format!("every run is {shorter}"),
+        (_, true) => format!("{shorter}; kept, since nothing moves in the longer runs"),
+        _ => format!("{shorter}; left out"),
     };
     let fault = Fault {
         kind: FaultKind::ShortRun,
@@ -493,12 +491,8 @@ fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
         signal: String::new(),
         detail,
     };
-    let runs = if all_short || keep {
-        runs
-    } else {
-        runs.into_iter().filter(|run| !is_short(run)).collect()
-    };
-    (runs, Some(fault))
+    let long = |run: &Run| all_short || keep || !is_short(run);
+    (runs.into_iter().filter(long).collect(), Some(fault))
 }
 
 #[cfg(test)]

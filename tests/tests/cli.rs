@@ -354,6 +354,8 @@ fn json_has_the_keys_that_were_promised() {
         "iterations",
         "flat",
         "cancelled",
+        "convergence",
+        "derived",
     ];
     assert_eq!(keys(&said), compare.into_iter().chain(more).collect());
     let parameters = &said["parameters"];

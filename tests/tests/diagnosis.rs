@@ -135,7 +135,7 @@ fn constant_inputs_and_short_logs_are_refused_with_the_reason() {
         refused.advice
     );
     let mut inputs = recording.run.inputs().to_vec();
-    inputs.chunks_exact_mut(2).for_each(|row| row[0] = 5.0);
+    inputs.chunks_exact_mut(2).for_each(|row| row[0] = 0.0);
     recording.run = recording.run.with_inputs(inputs).unwrap();
     let refused = judge(&recording, None);
     assert_eq!(refused.verdict, Conclusion::DataInsufficient);

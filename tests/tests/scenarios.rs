@@ -201,11 +201,11 @@ fn a_dead_encoder_stops_the_robot_in_a_third_of_a_second() {
 fn what_a_dead_encoder_taught_is_left_again() {
     let ridden_out = play("dead_encoder_ridden_out");
     ridden_out.recovers("dead encoder, ridden out", 1.1);
+    // What it taught is restrained so far that the last good model is not needed.
     let back = ridden_out.events("the last good model is back");
-    assert_eq!(back.len(), 1);
-    assert!((20.5..21.0).contains(&back[0]), "{back:?}");
+    assert!(back.is_empty(), "{back:?}");
     let used = ridden_out.events("the controller uses what was learned");
-    assert!(used.len() == 2 && used[1] > back[0], "{used:?}");
+    assert_eq!(used.len(), 1, "{used:?}");
     for (name, value) in [("K_C", 0.136), ("K_F", 0.656)] {
         let found = ridden_out.parameter(name);
         assert!(

@@ -27,9 +27,10 @@ pub(crate) fn run(arguments: &ImproveArguments) -> Result<()> {
     drop(bar);
     let answer = answer?;
     let mut text = report::improvement::text(&answer.engine);
-    for sentence in answer.feedforward.iter().flat_map(|f| f.sentences()) {
-        text.push_str(&sentence);
-        text.push('\n');
+    if let Some(feedforward) = &answer.feedforward {
+        let text_so_far = text.trim_end().len();
+        text.truncate(text_so_far);
+        text.push_str(&format!("\n\n{}", feedforward.sentences().join("\n")));
     }
     output::answer(&answer, &text, arguments.json)?;
     if let Some(path) = &arguments.output {
