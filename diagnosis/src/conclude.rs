@@ -104,9 +104,7 @@ impl Evidence<'_> {
     /// and what is left there must be more than noise.
     fn shown_by_starts(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
-        let explained = (self.nominal_fit.powi(2) - explanation.nrmse_fit.powi(2))
-            .max(0.0)
-            .sqrt();
+        let explained = explained(self.nominal_fit, explanation.nrmse_fit);
         self.nominal.holdout.test.is_none()
             && self.above_floor(self.error())
             && nrmse(&judged.losses) <= criteria.no_worse * self.error()
@@ -119,9 +117,7 @@ impl Evidence<'_> {
     fn is_missing(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
         let left = nrmse(&judged.rank);
-        let explained = (nrmse(self.nominal.rank).powi(2) - left.powi(2))
-            .max(0.0)
-            .sqrt();
+        let explained = explained(nrmse(self.nominal.rank), left);
         // It leaves hardly more than noise, or it explains a good part of the error.
         let complete =
             left < criteria.complete * self.floor && explained > criteria.matters * self.floor;
@@ -148,6 +144,11 @@ impl Evidence<'_> {
             && self.above_floor(self.error())
             && (self.nominal_fit < self.missing().explained * self.floor_fit || explained)
     }
+}
+
+/// What an explanation accounts for of an error, where it leaves another: squared errors add up.
+fn explained(error: f64, left: f64) -> f64 {
+    (error.powi(2) - left.powi(2)).max(0.0).sqrt()
 }
 
 /// Whether the log determines any parameter of the effect. An effect that cannot be told from the plant's own

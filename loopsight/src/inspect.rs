@@ -77,28 +77,20 @@ impl InspectOptions {
 pub fn inspect(log: &Log, options: &InspectOptions) -> Result<InspectAnswer> {
     let inventory = log.source.inventory();
     let known = Known::new(&inventory, options)?;
-    let mut plants: Vec<(f64, FittingPlant)> = Vec::new();
+    let mut plants: Vec<(f64, usize, FittingPlant)> = Vec::new();
     for meta in registry::plants() {
         if options.plant.as_deref().is_some_and(|id| id != meta.id) {
             continue;
         }
-        if let Some(found) = likely::fitting(meta, &inventory, &known)? {
-            plants.push(found);
+        if let Some((score, plant)) = likely::fitting(meta, &inventory, &known)? {
+            plants.push((score, meta.parameters.len(), plant));
         } else if options.plant.is_some() {
             return Err(unfit(log, meta));
         }
     }
     // Of plants that fit alike, the simplest is tried first.
-    let parameters = |id: &str| {
-        let all = registry::plants();
-        let meta = all.iter().find(|meta| meta.id == id);
-        meta.map_or(0, |meta| meta.parameters.len())
-    };
-    plants.sort_by(|a, b| {
-        let simpler = parameters(&a.1.plant).cmp(&parameters(&b.1.plant));
-        b.0.total_cmp(&a.0).then(simpler)
-    });
-    let plants: Vec<FittingPlant> = plants.into_iter().map(|(_, plant)| plant).collect();
+    plants.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let plants: Vec<FittingPlant> = plants.into_iter().map(|(_, _, plant)| plant).collect();
     let state = state(&inventory).map(|c| c.path.clone());
     let model_toml = match log.source.model_toml() {
         Some(text) if options.plant.is_none() => Some(text),

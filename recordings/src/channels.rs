@@ -172,13 +172,10 @@ impl Finder<'_> {
 
     /// The channel that a map names: by its path, or by the end of it where only one has it.
     fn named(&self, role: &'static str, id: &str, name: &str) -> Result<usize, RecordingError> {
-        self.log
-            .position(name)
-            .or_else(|| self.ending(name))
-            .ok_or_else(|| self.missing(role, id, name))
+        self.by_id(name).ok_or_else(|| self.missing(role, id, name))
     }
 
-    /// The channel of a signal that no map names.
+    /// The channel with this path, or the one whose path ends so.
     fn by_id(&self, id: &str) -> Option<usize> {
         self.log.position(id).or_else(|| self.ending(id))
     }
@@ -217,7 +214,7 @@ impl Finder<'_> {
 }
 
 /// The last part of a path.
-fn last(path: &str) -> &str {
+pub(crate) fn last(path: &str) -> &str {
     path.rsplit(['/', '.']).next().unwrap_or(path)
 }
 
@@ -258,18 +255,17 @@ fn rows(log: &Log, columns: &[usize], n: usize) -> Table {
         }],
         labels: labels(&channels),
         own_clocks: false,
-        cut: cut(log),
+        cut: cut(log).unwrap_or_default(),
     }
 }
 
-fn cut(log: &Log) -> String {
-    let cut = log.cut.as_ref();
-    cut.map_or_else(String::new, |cut| {
-        format!(
-            "the file ends too early: {} at byte {} is cut",
-            cut.what, cut.at
-        )
-    })
+/// Where the file ends too early; none where it is whole.
+pub(crate) fn cut(log: &Log) -> Option<String> {
+    let cut = log.cut.as_ref()?;
+    Some(format!(
+        "the file ends too early: {} at byte {} is cut",
+        cut.what, cut.at
+    ))
 }
 
 fn labels(channels: &[&Channel]) -> BTreeMap<usize, Vec<String>> {
@@ -386,6 +382,6 @@ fn on_all_stamps(log: &Log, wanted: &Wanted) -> Table {
         }],
         labels: labels.into_iter().map(|(at, w)| (at + 1, w)).collect(),
         own_clocks: true,
-        cut: cut(log),
+        cut: cut(log).unwrap_or_default(),
     }
 }

@@ -3,6 +3,8 @@
 use loopsight_core::unit::{parse, split_name};
 use loopsight_formats::{Kind, Log, Values};
 
+use crate::channels::{cut, last};
+use crate::median::median;
 use crate::source::Source;
 use crate::table::Table;
 
@@ -127,12 +129,7 @@ fn of_channels(log: &Log) -> Inventory {
     let first = spans().map(|s| s.0).fold(f64::INFINITY, f64::min);
     let end = spans().map(|s| s.1).fold(f64::NEG_INFINITY, f64::max);
     let mut notes = log.notes.clone();
-    if let Some(cut) = &log.cut {
-        notes.push(format!(
-            "the file ends too early: {} at byte {} is cut",
-            cut.what, cut.at
-        ));
-    }
+    notes.extend(cut(log));
     let mut duration = (end >= first).then_some(end - first);
     if duration.is_none() {
         let time = channels.iter().find(|c| c.is_time);
@@ -202,11 +199,6 @@ fn of_table(table: &Table, format: &str) -> Inventory {
 fn is_time(name: &str) -> bool {
     let name = name.to_lowercase();
     name == "t" || TIME_NAMES.iter().any(|n| name.starts_with(n))
-}
-
-/// The last part of a path.
-fn last(path: &str) -> &str {
-    path.rsplit(['/', '.']).next().unwrap_or(path)
 }
 
 /// How many are missing, and the range of the others.
@@ -295,14 +287,6 @@ fn clock(runs: &[&[f64]]) -> Option<ClockFacts> {
         longest_gap: pauses().copied().fold(0.0, f64::max),
         backwards,
     })
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -32,6 +32,7 @@ mod faults;
 mod inventory;
 mod map;
 mod mcap_log;
+mod median;
 mod model_file;
 mod plan;
 mod segment;

@@ -1,5 +1,7 @@
 //! Time stamps: which rows can be used, and where one run ends and the next begins.
 
+use crate::median::median;
+
 /// A jump back by more than this many periods is the start of another run, appended to the file.
 pub(crate) const NEW_RUN_PERIODS: f64 = 10.0;
 /// A step of more than this many periods, and of more than [`GAP_TIME`], is a gap.
@@ -30,12 +32,7 @@ pub(crate) fn segment(times: &[(usize, f64)]) -> Segments {
         .map(|w| w[1].1 - w[0].1)
         .filter(|step| *step > 0.0)
         .collect();
-    let middle = steps.len() / 2;
-    let period = if steps.is_empty() {
-        0.0
-    } else {
-        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
+    let period = median(&mut steps);
     let gap = GAP_TIME.max(GAP_PERIODS * period);
     let mut out = Segments::default();
     let mut part: Vec<usize> = Vec::new();

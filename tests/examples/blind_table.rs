@@ -20,7 +20,7 @@ use rayon::prelude::*;
 #[path = "blind/mod.rs"]
 mod blind;
 
-use blind::{Case, Recorded};
+use blind::{Case, Recorded, argument};
 
 /// Windings of a motor with an ironless rotor, s.
 const WINDINGS: &str = "1e-4";
@@ -86,14 +86,11 @@ impl Held {
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let value = |name: &str, default: &str| -> String {
-        let at = arguments.iter().position(|a| a == name);
-        at.and_then(|i| arguments.get(i + 1))
-            .map_or_else(|| default.to_owned(), Clone::clone)
-    };
     let list = |name: &str, default: &str| -> Vec<String> {
-        value(name, default).split(',').map(str::to_owned).collect()
+        argument(name, default)
+            .split(',')
+            .map(str::to_owned)
+            .collect()
     };
     let sizes: Vec<f64> = list("--sizes", "0.5,1,2")
         .iter()
@@ -107,11 +104,11 @@ fn main() {
                 .any(|n| n == e.name())
         })
         .collect();
-    let seeds: u64 = value("--seeds", "2").parse().unwrap_or(2);
-    let first: u64 = value("--first", "").parse().unwrap_or_else(|_| fresh());
-    let clean: u64 = value("--clean", "60").parse().unwrap_or(60);
-    let only = value("--only", "");
-    let windings: f64 = value("--windings", WINDINGS).parse().unwrap_or(1e-4);
+    let seeds: u64 = argument("--seeds", "2").parse().unwrap_or(2);
+    let first: u64 = argument("--first", "").parse().unwrap_or_else(|_| fresh());
+    let clean: u64 = argument("--clean", "60").parse().unwrap_or(60);
+    let only = argument("--only", "");
+    let windings: f64 = argument("--windings", WINDINGS).parse().unwrap_or(1e-4);
 
     let mut jobs: Vec<Case> = Vec::new();
     for (robot, effect) in catalogue() {
@@ -174,7 +171,7 @@ fn main() {
         .collect();
     let table = render(&rows);
     println!("{table}");
-    let file = value("--write", "");
+    let file = argument("--write", "");
     if !file.is_empty() {
         match std::fs::write(&file, format!("{HEADER}{table}")) {
             Ok(()) => eprintln!("wrote {file}"),

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 #[path = "blind/mod.rs"]
 mod blind;
 
-use blind::{Case, Recorded};
+use blind::{Case, Recorded, argument};
 
 /// Windings of a motor with an ironless rotor, s.
 const WINDINGS: f64 = 1e-4;
@@ -71,16 +71,10 @@ impl Count {
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let value = |name: &str, default: &str| -> String {
-        let at = arguments.iter().position(|a| a == name);
-        at.and_then(|i| arguments.get(i + 1))
-            .map_or_else(|| default.to_owned(), Clone::clone)
-    };
-    let number = |name: &str, default: u64| value(name, "").parse().unwrap_or(default);
+    let number = |name: &str, default: u64| argument(name, "").parse().unwrap_or(default);
     let (some, clean) = (number("--recordings", 12), number("--clean", 3));
     let recordings = record(some, clean, number("--first", 31));
-    let only = value("--only", "");
+    let only = argument("--only", "");
     let plain = Count::of(&recordings, &Criteria::DEFAULT);
     eprintln!("{} recordings: {}", recordings.len(), plain.text());
 
@@ -98,7 +92,7 @@ fn main() {
         let _ = writeln!(rows, "{} {effect} |", row(criterion));
     }
     let page = page(&recordings, plain, &rows);
-    let file = value("--write", "");
+    let file = argument("--write", "");
     if file.is_empty() {
         println!("{page}");
     } else {

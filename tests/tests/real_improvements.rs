@@ -152,7 +152,10 @@ fn denhams_flywheel_has_friction_and_measures_late() {
     };
     found.begins_with_friction(0.65..0.75);
     assert!((0.11..0.135).contains(&found.late()), "{} s", found.late());
-    assert_eq!(found.verdict, "nothing_missing");
+    assert!(found.last() < 0.006, "{:?}", found.unseen);
+    // What is left, half a percent, still depends on the position of the shaft, on blocks that did not
+    // choose it. So it is not called noise.
+    assert_eq!(found.verdict, "unknown_effect");
 }
 
 /// An arm that moves over 0.23 rad cannot carry its model, and the reason is said.

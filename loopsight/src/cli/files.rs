@@ -21,13 +21,19 @@ pub(crate) fn check<'p>(
     Ok(())
 }
 
-/// `[MODEL] LOG`, without some of its runs, with further logs and one to judge on.
-pub(crate) fn session(
+/// `[MODEL] LOG`, without some of its runs, with further logs and one to judge on; none of them is one of
+/// the `outputs`, which can be written.
+pub(crate) fn session<'p>(
+    outputs: impl IntoIterator<Item = &'p PathBuf>,
     names: &[PathBuf],
     also: &[PathBuf],
     without: &[String],
-    test: Option<&Path>,
+    test: Option<&PathBuf>,
 ) -> Result<Session> {
+    check(
+        outputs,
+        &[names, also, test.map_or(&[], std::slice::from_ref)],
+    )?;
     let read = |log: &PathBuf| -> Result<Log> {
         let runs: Vec<&str> = without.iter().map(String::as_str).collect();
         Log::read(log)?.without_runs(&runs)
@@ -53,6 +59,14 @@ pub(crate) fn session(
         session = session.test(Log::read(log)?)?;
     }
     Ok(session)
+}
+
+/// Writes a page where one is wanted; `make` makes it of the command for its foot.
+pub(crate) fn page(path: Option<&PathBuf>, make: impl FnOnce(&str) -> String) -> Result<()> {
+    match path {
+        Some(path) => save(path, &make(&output::command_line())),
+        None => Ok(()),
+    }
 }
 
 /// Writes a text file, and says so, and whether it replaced one.

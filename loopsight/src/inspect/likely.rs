@@ -110,15 +110,14 @@ pub(super) fn fitting(
 fn check(known: &Known, meta: &PlantMeta) -> Result<()> {
     let inputs = known.inputs.iter().map(|(id, _)| (id, "input"));
     let measured = known.measured.iter().map(|(id, _)| (id, "signal"));
-    let signals = || meta.inputs.iter().chain(meta.states).chain(meta.outputs);
     for (id, what) in inputs.chain(measured) {
         let Some(id) = id else { continue };
         // Of a plant that was not asked for, a foreign name says that it is not meant.
-        if !signals().any(|s| s.id == id) {
+        if !signals(meta).any(|s| s.id == id) {
             if any_plant_has(id) {
                 continue;
             }
-            let known: Vec<&str> = signals().map(|s| s.id).collect();
+            let known: Vec<&str> = signals(meta).map(|s| s.id).collect();
             return Err(Error::request(format!(
                 "no plant has the {what} `{id}`; `{}` has {}",
                 meta.id,
@@ -131,13 +130,12 @@ fn check(known: &Known, meta: &PlantMeta) -> Result<()> {
 
 fn any_plant_has(id: &str) -> bool {
     let plants = loopsight_model::registry::plants();
-    plants.iter().any(|m| {
-        m.inputs
-            .iter()
-            .chain(m.states)
-            .chain(m.outputs)
-            .any(|s| s.id == id)
-    })
+    plants.iter().any(|meta| signals(meta).any(|s| s.id == id))
+}
+
+/// All that a plant has a name for.
+fn signals(meta: &PlantMeta) -> impl Iterator<Item = &Signal> {
+    meta.inputs.iter().chain(meta.states).chain(meta.outputs)
 }
 
 /// The channel that the caller named for a signal.

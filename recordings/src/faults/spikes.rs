@@ -5,6 +5,7 @@ use loopsight_model::run::Run;
 use super::signal;
 use crate::fault::{Fault, FaultKind};
 use crate::map::Recording;
+use crate::median::median;
 
 /// How far a reading must be from the mean of its neighbours, over what is usual for that signal.
 const FAR: f64 = 12.0;
@@ -84,8 +85,6 @@ fn usual(runs: &[Run], s: usize) -> f64 {
     if all.is_empty() {
         return f64::INFINITY;
     }
-    let middle = all.len() / 2;
-    let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
     let steps = runs.iter().flat_map(|run| {
         let values: Vec<f64> = signal(run, s).collect();
         values
@@ -98,9 +97,7 @@ fn usual(runs: &[Run], s: usize) -> f64 {
     if steps.is_empty() {
         return f64::INFINITY;
     }
-    let middle = steps.len() / 2;
-    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    (median / 0.6745).max(0.5 * step)
+    (median(&mut all) / 0.6745).max(0.5 * median(&mut steps))
 }
 
 /// Readings that stand alone.

@@ -115,7 +115,7 @@ fn of_motor(table: &Table, voltage: usize, speed: usize, signal: &str) -> Vec<Fa
         .collect();
     let all = || traces.iter().flat_map(|t| &t.windows);
     let large = large(all().map(|w| w.speed));
-    let highest = all().map(|w| w.voltage.abs()).fold(0.0, f64::max);
+    let highest = highest(all());
     if traces.len() < 2 || large <= 0.0 || highest <= 0.0 {
         return Vec::new();
     }
@@ -153,6 +153,12 @@ fn besides<'t>(
     let all = traces.iter().enumerate();
     all.filter(move |(i, _)| *i != index && !broken.contains(i))
         .map(|(_, trace)| trace)
+}
+
+/// The largest voltage, either way.
+fn highest<'w>(windows: impl IntoIterator<Item = &'w Window>) -> f64 {
+    let volts = windows.into_iter().map(|w| w.voltage.abs());
+    volts.fold(0.0, f64::max)
 }
 
 /// Windows of a run, each half over the one before.
@@ -274,7 +280,7 @@ fn held_up<'t>(
         let phi = Vector3::new(direction.signum(), w.speed, w.acceleration);
         without.terms.dot(&phi)
     };
-    let highest = (trace.windows.iter().map(|w| w.voltage.abs())).fold(0.0, f64::max);
+    let highest = highest(&trace.windows);
     let far = |w: &Window| {
         let wasted = w.voltage.signum() * (w.voltage - needed(w));
         wasted > HELD_UP * w.voltage.abs() && w.voltage.abs() > HELD_UP * highest
@@ -332,11 +338,8 @@ fn stall<'t>(
 
 /// The highest voltage at rest before it first moves.
 fn breakaway(trace: &Trace<'_>, large: f64) -> Option<f64> {
-    let rest = trace
-        .windows
-        .iter()
-        .take_while(|w| w.speed.abs() < RESTS * large);
-    let volts = rest.map(|w| w.voltage.abs()).fold(0.0, f64::max);
+    let windows = trace.windows.iter();
+    let volts = highest(windows.take_while(|w| w.speed.abs() < RESTS * large));
     (volts > 0.0).then_some(volts)
 }
 
@@ -347,14 +350,8 @@ fn blocked<'t>(
     large: f64,
 ) -> Option<String> {
     let own = breakaway(trace, large)?;
-    let steps = |t: &Trace<'_>| {
-        let highest = t
-            .windows
-            .iter()
-            .map(|w| w.voltage.abs())
-            .fold(0.0, f64::max);
-        breakaway(t, large).is_some_and(|volts| volts > 0.5 * highest)
-    };
+    let steps =
+        |t: &Trace<'_>| breakaway(t, large).is_some_and(|volts| volts > 0.5 * highest(&t.windows));
     let elsewhere = (others.clone().filter(|t| !steps(t)))
         .filter_map(|t| breakaway(t, large))
         .fold(0.0, f64::max);

@@ -9,6 +9,12 @@ use loopsight_model::model::Model;
 /// A refit of the plain model leaves less than this multiple of the floor: nothing shows.
 const INVISIBLE: f64 = 1.15;
 
+/// What follows the argument `name`, or a default.
+pub(crate) fn argument(name: &str, default: &str) -> String {
+    let mut arguments = std::env::args().skip_while(|a| a != name);
+    arguments.nth(1).unwrap_or_else(|| default.to_owned())
+}
+
 /// What is recorded.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Case {

@@ -34,6 +34,13 @@ struct Head {
     path: String,
 }
 
+impl Head {
+    /// Number of elements; none where that is more than can be counted.
+    fn count(&self) -> Option<usize> {
+        (self.dims.iter()).try_fold(1usize, |n, d| n.checked_mul(*d))
+    }
+}
+
 fn head(bits: &mut Bits<'_>, path: Option<&str>) -> Option<Head> {
     let flags = bits.element()?.numbers()?.next()? as u32;
     let class = flags as u8;
@@ -122,7 +129,7 @@ fn numbers(
     let (Some(count), Some(numbers)) = (element.len(), element.numbers()) else {
         return Ok(None);
     };
-    let wanted = head.dims.iter().try_fold(1usize, |n, d| n.checked_mul(*d));
+    let wanted = head.count();
     if wanted != Some(count) {
         return Ok(None);
     }
@@ -206,8 +213,7 @@ fn cell(
     sink: &mut dyn Sink,
     depth: usize,
 ) -> Result<Option<()>, FormatError> {
-    let count = head.dims.iter().try_fold(1usize, |n, d| n.checked_mul(*d));
-    let Some(count) = count else {
+    let Some(count) = head.count() else {
         return Ok(None);
     };
     if count > ARRAY_MOST {
@@ -248,8 +254,7 @@ fn structure(
             String::from_utf8_lossy(&name[..end]).into_owned()
         })
         .collect();
-    let count = head.dims.iter().try_fold(1usize, |n, d| n.checked_mul(*d));
-    let Some(count) = count else {
+    let Some(count) = head.count() else {
         return Ok(None);
     };
     if count > ARRAY_MOST {

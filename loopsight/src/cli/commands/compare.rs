@@ -8,8 +8,13 @@ use crate::error::Result;
 use crate::words::report;
 
 pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
-    files::check(&arguments.html, &[&arguments.files])?;
-    let session = files::session(&arguments.files, &[], &arguments.without, None)?;
+    let session = files::session(
+        &arguments.html,
+        &arguments.files,
+        &[],
+        &arguments.without,
+        None,
+    )?;
     let bar = Bar::new();
     let options = CompareOptions::default()
         .series(arguments.series)
@@ -22,8 +27,5 @@ pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     }
     let text = report::comparison::text(&answer.engine);
     output::answer(&answer, &text, arguments.json)?;
-    if let Some(path) = &arguments.html {
-        files::save(path, &answer.page(&output::command_line()))?;
-    }
-    Ok(())
+    files::page(arguments.html.as_ref(), |foot| answer.page(foot))
 }

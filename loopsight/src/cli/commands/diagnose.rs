@@ -8,15 +8,12 @@ use crate::error::Result;
 use crate::words::report;
 
 pub(crate) fn run(arguments: &DiagnoseArguments) -> Result<()> {
-    files::check(
-        &arguments.html,
-        &[&arguments.files, &arguments.also, arguments.test.as_slice()],
-    )?;
     let session = files::session(
+        &arguments.html,
         &arguments.files,
         &arguments.also,
         &arguments.without,
-        arguments.test.as_deref(),
+        arguments.test.as_ref(),
     )?;
     let bar = Bar::new();
     let options = DiagnoseOptions::default()
@@ -30,8 +27,5 @@ pub(crate) fn run(arguments: &DiagnoseArguments) -> Result<()> {
         &report::diagnosis::text(&answer.engine),
         arguments.json,
     )?;
-    if let Some(path) = &arguments.html {
-        files::save(path, &answer.page(&output::command_line()))?;
-    }
-    Ok(())
+    files::page(arguments.html.as_ref(), |foot| answer.page(foot))
 }

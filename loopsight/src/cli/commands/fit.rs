@@ -9,15 +9,12 @@ use crate::{FitOptions, Method, Scheme};
 
 pub(crate) fn run(arguments: &FitArguments) -> Result<()> {
     let outputs = arguments.output.iter().chain(&arguments.html);
-    files::check(
-        outputs,
-        &[&arguments.files, &arguments.also, arguments.test.as_slice()],
-    )?;
     let session = files::session(
+        outputs,
         &arguments.files,
         &arguments.also,
         &arguments.without,
-        arguments.test.as_deref(),
+        arguments.test.as_ref(),
     )?;
     let bar = Bar::new();
     let options = FitOptions::default()
@@ -46,8 +43,6 @@ pub(crate) fn run(arguments: &FitArguments) -> Result<()> {
     if let Some(path) = &arguments.output {
         files::save(path, answer.model().to_toml())?;
     }
-    if let Some(path) = &arguments.html {
-        files::save(path, &answer.page(&output::command_line()))?;
-    }
+    files::page(arguments.html.as_ref(), |foot| answer.page(foot))?;
     answer.arrived()
 }

@@ -9,15 +9,12 @@ use crate::words::report;
 
 pub(crate) fn run(arguments: &ImproveArguments) -> Result<()> {
     let outputs = arguments.output.iter().chain(&arguments.html);
-    files::check(
-        outputs,
-        &[&arguments.files, &arguments.also, arguments.test.as_slice()],
-    )?;
     let session = files::session(
+        outputs,
         &arguments.files,
         &arguments.also,
         &arguments.without,
-        arguments.test.as_deref(),
+        arguments.test.as_ref(),
     )?;
     let bar = Bar::new();
     let options = ImproveOptions::default()
@@ -39,8 +36,5 @@ pub(crate) fn run(arguments: &ImproveArguments) -> Result<()> {
             None => files::save_described(path, &session)?,
         }
     }
-    if let Some(path) = &arguments.html {
-        files::save(path, &answer.page(&output::command_line()))?;
-    }
-    Ok(())
+    files::page(arguments.html.as_ref(), |foot| answer.page(foot))
 }
