@@ -193,6 +193,11 @@ impl DriverPart for LinuxGpio {
         )))
     }
 
+    /// Each motor has its `limit_v`.
+    fn is_limited(&self) -> bool {
+        true
+    }
+
     fn is_simulated(&self) -> bool {
         false
     }

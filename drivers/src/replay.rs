@@ -103,6 +103,10 @@ impl DriverPart for Replay {
         }))
     }
 
+    fn is_driven(&self) -> bool {
+        false
+    }
+
     fn is_simulated(&self) -> bool {
         true
     }

@@ -13,7 +13,7 @@ use crate::fault::Faults;
 use crate::simulated::{Limit, Simulated};
 
 /// Step of the robot where the file gives none, s.
-const STEP: f64 = 1e-4;
+pub(crate) const STEP: f64 = 1e-4;
 
 /// A robot made of a model. Its steps allocate nothing.
 #[derive(Clone)]

@@ -12,7 +12,7 @@ use loopsight_model::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
 use crate::fault::SensorFault;
-use crate::robot::{Robot, unknown};
+use crate::robot::{Robot, STEP, unknown};
 
 /// A model as the robot: the loop's own, or another one that hides what the loop's lacks.
 ///
@@ -80,6 +80,13 @@ impl Default for Simulated {
             quantize: true,
             fault: Vec::new(),
         }
+    }
+}
+
+impl Simulated {
+    /// Longest integration step that these settings give the robot, s; its model's own may be shorter.
+    pub fn longest_step(&self) -> f64 {
+        self.step_s.unwrap_or(STEP)
     }
 }
 

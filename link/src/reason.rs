@@ -72,6 +72,8 @@ pub enum Unusable {
     Controller,
     /// Settings of the safety.
     Safety,
+    /// What the loop file of the run does not declare changeable while the robot drives.
+    NotChangeable,
 }
 
 impl Reason {
@@ -150,6 +152,9 @@ impl fmt::Display for Unusable {
             Unusable::Learning => f.write_str("the settings of the learning"),
             Unusable::Controller => f.write_str("gains or limits of the control law"),
             Unusable::Safety => f.write_str("the settings of the safety"),
+            Unusable::NotChangeable => f.write_str(
+                "what the loop file of the run does not declare `changeable` while the robot drives",
+            ),
         }
     }
 }

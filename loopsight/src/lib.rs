@@ -79,6 +79,7 @@ mod about;
 mod add;
 pub mod answers;
 #[cfg(feature = "cli")]
+mod bounded;
 mod bringup;
 mod check;
 #[cfg(feature = "cli")]

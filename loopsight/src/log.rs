@@ -24,6 +24,26 @@ pub struct Log {
     text: Option<String>,
 }
 
+/// Refuses what need not have an end, other than a pipe.
+#[cfg(unix)]
+fn endless(path: &Path) -> Result<()> {
+    use std::os::unix::fs::FileTypeExt as _;
+    // Of a file that is not there somebody else says so.
+    let found = std::fs::metadata(path).map(|m| m.file_type());
+    if found.is_ok_and(|t| t.is_char_device() || t.is_block_device() || t.is_socket()) {
+        let shown = path.display();
+        let message = format!("cannot read {shown}: it is a device or a socket, expected a file");
+        return Err(Error::request(message));
+    }
+    Ok(())
+}
+
+/// There are only files here.
+#[cfg(not(unix))]
+fn endless(_: &Path) -> Result<()> {
+    Ok(())
+}
+
 impl Log {
     /// Reads a log: CSV with units at the end of the names (`voltage_right_V`), SysId JSON, or what other
     /// programs write: WPILOG, ULog, MCAP, ROS 2 bags (the folder), MATLAB, NumPy, and with the feature
@@ -35,6 +55,7 @@ impl Log {
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let name = path.display().to_string();
+        endless(path)?;
         match loopsight_recordings::read(path) {
             Ok(source) => Ok(Self {
                 // Read again where a message has to show a line: a log may be large.

@@ -11,6 +11,7 @@ use loopsight_recordings::{Fault, Recording, RecordingError, Severity, Source};
 
 use crate::about::About;
 use crate::answers::LogFault;
+use crate::bounded;
 use crate::error::{Error, Result};
 use crate::log::Log;
 use crate::model::Model;
@@ -256,6 +257,7 @@ fn matched(model: &mut Composed, log: &Log) -> Result<(Vec<Run>, Vec<Fault>)> {
             None => message,
         })
     })?;
+    bounded::log(&log.name, model, &recording.runs)?;
     Ok((recording.runs, recording.faults))
 }
 

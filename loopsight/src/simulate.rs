@@ -13,6 +13,7 @@ use loopsight_recordings::{ColumnName, Table, TableRun, header};
 use serde::Deserialize;
 
 use crate::answers::{ExperimentAnswer, SimulateAnswer};
+use crate::bounded;
 use crate::columns;
 use crate::error::{Error, Result};
 use crate::log::Log;
@@ -88,6 +89,10 @@ impl Written {
             let message =
                 format!("that is {samples:.1e} samples, expected at most {MOST_SAMPLES:e}");
             return Err(source.error(&["period_s".into()], &message, None));
+        }
+        let step = experiment.robot.longest_step();
+        if let Some(message) = bounded::robot(experiment.duration_s, step).filter(|_| step > 0.0) {
+            return Err(source.error(&["duration_s".into()], &message, None));
         }
         if experiment.robot.model.is_some() {
             let message =

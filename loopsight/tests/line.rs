@@ -98,6 +98,66 @@ fn a_robot_that_is_not_there_fails_in_words() {
     assert!(complaint.contains("runs its loop itself"), "{complaint}");
 }
 
+/// Firmware that does not look at its own sensors: the host does.
+#[test]
+fn a_robot_that_measures_no_number_fails_in_words() {
+    let mut desk = Desk::with_body();
+    desk.mad_from = Some(50);
+    let (line, thread) = desk.at_port();
+    let folder = folder();
+    write(folder.path(), "loop.toml", LOOP, &line);
+    let output = loopsight(folder.path(), &["run", "loop.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("sent NaN among its measurements"), "{said}");
+    thread.join().unwrap();
+}
+
+/// What the file of a run does not declare changeable stays, and the robot drives on with it.
+#[test]
+fn what_is_not_declared_changeable_is_refused_at_the_door() {
+    let folder = folder();
+    let mut desk = Desk::with_body();
+    desk.by_clock = true;
+    let (line, thread) = desk.at_port();
+    let door = folder.path().join("door");
+    let with_door = LOOP
+        .replace(
+            "[reference]",
+            "[controller.aboard.safety]\nwatchdog_s = 5.0\n\n[reference]",
+        )
+        .replace(
+            "[controller.aboard]\n",
+            &format!("[controller.aboard]\ndoor = \"{}\"\n", door.display()),
+        )
+        .replace("duration_s = 20.0", "duration_s = 4.0");
+    write(folder.path(), "loop.toml", &with_door, &line);
+    let faster = with_door.replace("settling_time_s = 0.45", "settling_time_s = 0.3");
+    write(folder.path(), "faster.toml", &faster, &line);
+    std::thread::scope(|scope| {
+        let run = scope.spawn(|| said(folder.path(), &["run", "loop.toml"]));
+        let opened = (0..1000).any(|_| {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+            door.exists()
+        });
+        assert!(opened);
+        let output = loopsight(folder.path(), &["send", "faster.toml"]);
+        let complaint = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{complaint}");
+        assert!(
+            complaint.contains("does not declare `changeable`"),
+            "{complaint}"
+        );
+        let text = run.join().unwrap();
+        assert!(
+            text.contains("another model was refused at the door"),
+            "{text}"
+        );
+        assert!(text.contains("400 ticks"), "{text}");
+    });
+    thread.join().unwrap();
+}
+
 /// A robot that waits takes what it is sent, and says so; what it does not know is refused by name.
 #[test]
 fn a_robot_that_waits_is_sent_a_model() {
@@ -149,7 +209,10 @@ fn a_robot_that_drives_is_sent_a_better_model() {
         .replace("[reference]", patient)
         .replace(
             "[controller.aboard]\n",
-            &format!("[controller.aboard]\ndoor = \"{}\"\n", door.display()),
+            &format!(
+                "[controller.aboard]\ndoor = \"{}\"\nchangeable = {{ effects = [\"coulomb_friction\"] }}\n",
+                door.display()
+            ),
         )
         .replace("duration_s = 20.0", "duration_s = 6.0");
     write(folder.path(), "loop.toml", &with_door, &line);

@@ -6,6 +6,7 @@
 mod edit;
 mod place;
 
+use std::io::Read as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -44,6 +45,9 @@ pub struct ReadError {
     pub why: String,
 }
 
+/// Most bytes of a model, loop or experiment file: beyond it another file was meant.
+const MOST_TEXT: u64 = 10_000_000;
+
 /// Reads a text file, with the reasons people meet spelled out.
 pub fn read_text(path: &Path) -> Result<String, ReadError> {
     let error = |why: String| ReadError {
@@ -53,10 +57,22 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
     if path.is_dir() {
         return Err(error("it is a directory, expected a file".to_owned()));
     }
-    let bytes = std::fs::read(path).map_err(|e| match e.kind() {
+    let wrong = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::NotFound => error("there is no such file".to_owned()),
         _ => error(e.to_string()),
-    })?;
+    };
+    let mut bytes = Vec::new();
+    // A device or a pipe need not have an end.
+    let file = std::fs::File::open(path).map_err(wrong)?;
+    file.take(MOST_TEXT + 1)
+        .read_to_end(&mut bytes)
+        .map_err(wrong)?;
+    if bytes.len() as u64 > MOST_TEXT {
+        let most = MOST_TEXT / 1_000_000;
+        return Err(error(format!(
+            "it has more than {most} MB, expected a text file of at most {most} MB"
+        )));
+    }
     String::from_utf8(bytes).map_err(|e| {
         error(format!(
             "byte {} is not text (UTF-8), expected a text file",

@@ -1,5 +1,7 @@
 //! A loop, composed from TOML.
 
+mod watch;
+
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
@@ -15,11 +17,13 @@ use crate::registry::{
     HostDriverError,
 };
 use crate::regression::Scheme;
-use crate::supervisor::SupervisorSettings;
+use crate::supervisor::Supervision;
 use loopsight_core::supervisor::Supervisor;
 use loopsight_core::{
     AffineModel, Clock, Controller, Loop, Signal, SimulatedClock, SystemClock, TickError,
 };
+
+pub use watch::Watch;
 
 /// A loop file, as written.
 #[derive(Debug, Serialize, Deserialize)]
@@ -57,9 +61,9 @@ pub struct LoopFile {
     /// Limits of inputs and of the controlled signals' references, by signal.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub limits: LimitSettings,
-    /// What watches over the loop, if anything.
+    /// What watches over the loop: a table, or `false`; see [`LoopFile::watch`] for a file that says nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub supervisor: Option<SupervisorSettings>,
+    pub supervisor: Option<Supervision>,
     /// Where the log is written, relative to the loop file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
@@ -90,6 +94,10 @@ pub struct Composed {
     target: Vec<f64>,
     /// What the controller says of its design.
     pub notes: Vec<String>,
+    /// A supervisor decides whether what is learned is used.
+    pub judges_learning: bool,
+    /// The supervisor that watches although the file asks for none, in words.
+    pub assumed: Option<&'static str>,
 }
 
 impl Composed {
@@ -227,15 +235,24 @@ impl LoopFile {
             let help = "give the law its `limit` instead".to_owned();
             return Err(source.error(&["limits".into()], message, Some(help)));
         }
-        let rows = identification.as_ref().map_or(0, Identification::len);
-        let supervisor = match &self.supervisor {
+        if !self.driver.is_simulated() {
+            self.limited(source, model)?;
+        }
+        let watch = self.watch();
+        let judges_learning = watch.as_ref().is_some_and(|w| w.learning);
+        let rows = identification.as_ref().filter(|_| judges_learning);
+        let rows = rows.map_or(0, Identification::len);
+        let supervisor = match &watch {
             None => None,
-            Some(settings) => Some(
-                settings
+            Some(watch) => Some(
+                watch
+                    .settings
                     .build(model, rows)
                     .map_err(|e| placed(source, &["supervisor".into()], e))?,
             ),
         };
+        let assumed = watch.and_then(|w| w.assumed);
+        notes.extend(assumed.filter(|_| judges_learning).map(str::to_owned));
         // A simulation is as fast as it can be; a robot's own timer is waited for where it is read.
         let hurries = self.driver.is_simulated() && !self.real_time;
         let clock: Box<dyn Clock> = if hurries || self.driver.runs_law() {
@@ -267,6 +284,8 @@ impl LoopFile {
             controlled,
             references,
             notes,
+            judges_learning,
+            assumed,
         })
     }
 }

@@ -1,5 +1,7 @@
 //! `[supervisor]` of a loop file, and its events in words.
 
+mod choice;
+
 use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
@@ -10,6 +12,8 @@ use crate::model::Model;
 use crate::registry::BuildError;
 use crate::sensor::Sensor;
 use loopsight_core::supervisor::{Action, Cause, Event, Supervisor, Thresholds};
+
+pub use choice::Supervision;
 
 /// When a supervisor acts, see [`Supervisor`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

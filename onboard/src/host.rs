@@ -1,5 +1,6 @@
 //! `[controller.aboard]`: the host's end of the line.
 
+mod changeable;
 mod configured;
 mod conversation;
 #[cfg(unix)]
@@ -21,6 +22,7 @@ use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, ControllerPart, PartMeta, Setting};
 use serde::{Deserialize, Serialize};
 
+pub use changeable::Changeable;
 use conversation::Conversation;
 pub use line::{Line, LineError};
 pub use send::{Acknowledged, SendError, send};
@@ -48,6 +50,9 @@ pub struct Aboard {
     /// Unix socket at which a run of this loop takes another model for the robot: `loopsight send`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub door: Option<String>,
+    /// What may be changed there while the robot drives; by default nothing.
+    #[serde(default)]
+    pub changeable: Changeable,
     /// The law, as in `[controller.feedback_linearizing_pi]`.
     pub law: FeedbackLinearizingPiSettings,
     /// The estimators, as in `[estimator.rls]`; without it nothing is learned aboard.
@@ -180,6 +185,12 @@ const META: PartMeta = PartMeta {
              default: none",
         ),
         Setting::new(
+            "changeable",
+            "",
+            "table: what may be changed there: `parameters` of the plant by `[low, high]`, `effects` that may come, \
+             go and change, and whether `gains` may; default: nothing",
+        ),
+        Setting::new(
             "law",
             "",
             "table: the law, as in `[controller.feedback_linearizing_pi]`, from gains",
@@ -211,6 +222,10 @@ impl ControllerPart for Aboard {
         &META
     }
 
+    fn is_limited(&self) -> bool {
+        self.law.limit.is_some()
+    }
+
     fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError> {
         let Some(line) = &self.line else {
             let error = BuildError::at("", "at which line is the robot?");
@@ -226,7 +241,9 @@ impl ControllerPart for Aboard {
         }
         let configuration = self.configuration(model, period)?;
         let line = Line::at(line, self.baud, self.timeout_s);
-        let robot = Conversation::new(line, configuration, period).with_door(self.door.as_ref());
+        let allowed = self.changeable.of(model)?;
+        let robot = Conversation::new(line, configuration, period);
+        let robot = robot.with_door(self.door.as_ref(), allowed);
         Ok(Box::new(remote::Remote::new(robot, self.told(model))))
     }
 

@@ -61,7 +61,9 @@ pub use effects::{EffectSet, acts_aboard};
 pub use efforts::Efforts;
 pub use estimator::{OnboardEstimator, RowEstimator};
 #[cfg(feature = "std")]
-pub use host::{Aboard, Acknowledged, Line, LineError, SafetySettings, SendError, Serial, send};
+pub use host::{
+    Aboard, Acknowledged, Changeable, Line, LineError, SafetySettings, SendError, Serial, send,
+};
 pub use law::OnboardLaw;
 pub use learner::Learner;
 pub use loopsight_link::Attachment;

@@ -99,11 +99,11 @@ fn robot(index: usize, estimator: &str, used: Use) -> (Model, Composed) {
         .unwrap();
     }
     // Watched by nobody, unless it is asked for.
-    text.push_str(if used == Use::Supervised {
-        "[supervisor]\n"
+    if used == Use::Supervised {
+        text.push_str("[supervisor]\n");
     } else {
-        ""
-    });
+        text.insert_str(0, "supervisor = false\n");
+    }
     let model = Model::from_toml("model.toml", &model).unwrap().0;
     let composed = composed(&text, &model, &robot).unwrap();
     (model, composed)

@@ -242,6 +242,10 @@ impl ControllerPart for FeedbackLinearizingPiSettings {
         &META
     }
 
+    fn is_limited(&self) -> bool {
+        self.limit.is_some()
+    }
+
     fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError> {
         let n = at_rest(model, META.id)?.n;
         let limit = match &self.limit {

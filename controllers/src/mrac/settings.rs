@@ -88,6 +88,10 @@ impl ControllerPart for MracSettings {
         &META
     }
 
+    fn is_limited(&self) -> bool {
+        self.limit.is_some()
+    }
+
     fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError> {
         let rest = at_rest(model, META.id)?;
         let n = rest.n;

@@ -124,6 +124,10 @@ impl ControllerPart for TrajectorySettings {
         &META
     }
 
+    fn is_limited(&self) -> bool {
+        self.velocity.is_limited()
+    }
+
     fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError> {
         check_vehicle(model)?;
         if let Some((key, found)) = self.path.mistake() {

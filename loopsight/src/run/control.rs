@@ -1,13 +1,16 @@
 //! A loop file: what a loop is composed of.
 
+use std::any::Any;
 use std::path::{Path, PathBuf};
 
+use loopsight_drivers::Simulated;
 use loopsight_model::config::{TomlSource, read_text};
 use loopsight_model::loop_file::{Composed, LoopFile};
 use loopsight_model::model::Model as ComposedModel;
 use loopsight_model::registry::{BuildError, DriverContext};
 
 use crate::about::About;
+use crate::bounded;
 use crate::columns;
 use crate::error::Result;
 use crate::model::Model;
@@ -108,6 +111,14 @@ impl Loop {
             let message = format!("that is {ticks:.1e} ticks, expected at most {MOST_TICKS:e}");
             return Err(source.error(&["duration_s".into()], &message, None).into());
         }
+        let driver: &dyn Any = file.driver.as_ref();
+        if let (Some(simulated), Some(duration)) =
+            (driver.downcast_ref::<Simulated>(), file.duration_s)
+            && let Some(message) = bounded::robot(duration, simulated.longest_step())
+                .filter(|_| !file.real_time && simulated.longest_step() > 0.0)
+        {
+            return Err(source.error(&["duration_s".into()], &message, None).into());
+        }
         let load_model = |name: &str| {
             ComposedModel::load(&self.beside(name))
                 .map(|(model, _)| model)
@@ -140,11 +151,14 @@ impl Loop {
             .map_or_else(String::new, |e| format!(", estimator `{}`", e.meta().id));
         let controlled: Vec<&str> = composed.controlled.iter().map(|s| s.id).collect();
         Ok(format!(
-            "a loop at {} Hz: driver `{}`, controller `{}`{estimator}, references for {}",
+            "a loop at {} Hz: driver `{}`, controller `{}`{estimator}, references for {}{}",
             number(1.0 / file.period_s),
             file.driver.meta().id,
             file.controller.meta().id,
-            controlled.join(", ")
+            controlled.join(", "),
+            composed
+                .assumed
+                .map_or_else(String::new, |why| format!("; {why}"))
         ))
     }
 

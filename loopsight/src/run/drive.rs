@@ -33,6 +33,7 @@ pub(super) fn drive(
         ),
         failed: false,
     };
+    let judged = composed.judges_learning;
     for index in 0..ticks {
         let time = index as f64 * file.period_s;
         if options.watch.is_cancelled() {
@@ -43,7 +44,7 @@ pub(super) fn drive(
         }
         let late = match composed.tick(time) {
             Ok(step) => {
-                recorder.push(&step, file.supervisor.is_some());
+                recorder.push(&step, judged);
                 if let Some(look) = &options.on_tick {
                     look(&RunView::new(&step, recorder, file.duration_s));
                 }
@@ -58,7 +59,10 @@ pub(super) fn drive(
                             let said = composed.host.controller.remark();
                             said.map_or_else(|| e.to_string(), str::to_owned)
                         }
-                        TickError::Supervisor(event) => recorder.words(event),
+                        TickError::Supervisor(event) => match composed.assumed {
+                            None => recorder.words(event),
+                            Some(why) => format!("{}; {why}", recorder.words(event)),
+                        },
                     },
                 };
                 if end.failed {

@@ -177,7 +177,7 @@ impl Recorder {
         let reference = |s: &&Signal| format!("reference_{}", header(s));
         headers.extend(composed.controlled.iter().map(reference));
         headers.extend(["saturated_1", "fresh_1"].map(str::to_owned));
-        if composed.host.supervisor.is_some() {
+        if composed.judges_learning {
             headers.push("fallen_back_1".to_owned());
         }
         let named = |prefix: &str, id: &str, unit: &str| format!("{prefix}_{}", column(id, unit));

@@ -36,6 +36,10 @@ pub trait ControllerPart: Debug + Send + Sync + Any {
     fn inverts_model(&self) -> bool {
         false
     }
+    /// True where its settings say how large its commands get: the loop needs no `[limits]` then to drive a robot.
+    fn is_limited(&self) -> bool {
+        false
+    }
     /// What the design promises: the controlled signals from rest, sampled with `period` (s), for
     /// `references` (one list of samples per controlled signal), without limits or disturbances.
     /// `None` where the design promises nothing of that kind.
@@ -102,6 +106,15 @@ pub trait DriverPart: Debug + Send + Sync + Any {
     fn build(&self, context: &DriverContext<'_>) -> Result<HostDriver, BuildError>;
     /// True when the driver's time is simulated: the loop then runs as fast as it can.
     fn is_simulated(&self) -> bool;
+    /// True where what is measured follows from what is commanded. A log that is played back does not, so nobody
+    /// can tell from it whether a loop goes the wrong way.
+    fn is_driven(&self) -> bool {
+        true
+    }
+    /// True where its settings say how large the inputs get that it takes.
+    fn is_limited(&self) -> bool {
+        false
+    }
     /// True where the robot runs the loop's law itself, by a timer of its own: its readings keep the time, and
     /// [`DriverPart::build_with`] makes the controller.
     fn runs_law(&self) -> bool {

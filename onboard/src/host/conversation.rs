@@ -7,6 +7,7 @@ use loopsight_link::{
     VERSION, Welcome,
 };
 
+use super::changeable::Allowed;
 #[cfg(unix)]
 use super::door::Door;
 use super::{Line, LineError};
@@ -23,6 +24,7 @@ pub(super) struct Conversation {
     #[cfg(unix)]
     door: Option<Door>,
     door_at: Option<String>,
+    allowed: Allowed,
     welcome: Option<Welcome>,
 }
 
@@ -66,33 +68,6 @@ fn named(what: Unusable, configuration: &Configuration) -> String {
     }
 }
 
-/// What of a configuration may not change while a robot drives: its plant, its limits, its safety, how far it may
-/// learn; and a model beyond that range.
-#[cfg(unix)]
-fn changes(now: &Configuration, next: &Configuration) -> Result<(), Unusable> {
-    if next.plant != now.plant {
-        return Err(Unusable::Plant);
-    }
-    if next.controller.limit != now.controller.limit {
-        return Err(Unusable::Controller);
-    }
-    if next.safety != now.safety {
-        return Err(Unusable::Safety);
-    }
-    let within = |i: usize, value: f32| {
-        now.learning.as_ref().is_none_or(|learning| {
-            let low = learning.low.get(i).is_none_or(|low| value >= *low);
-            low && learning.high.get(i).is_none_or(|high| value <= *high)
-        })
-    };
-    let mut values = next.parameters.iter().enumerate();
-    let sized = next.parameters.len() == now.parameters.len();
-    if !sized || !values.all(|(i, value)| value.is_finite() && within(i, *value)) {
-        return Err(Unusable::Parameters);
-    }
-    Ok(())
-}
-
 impl Conversation {
     pub(super) fn new(line: Line, configuration: Configuration, period: f64) -> Self {
         Self {
@@ -105,13 +80,15 @@ impl Conversation {
             #[cfg(unix)]
             door: None,
             door_at: None,
+            allowed: Allowed::default(),
             welcome: None,
         }
     }
 
-    /// The same, with a socket through which a running robot is given another model.
-    pub(super) fn with_door(mut self, at: Option<&String>) -> Self {
+    /// The same, with a socket through which a running robot is given another model, as far as that is allowed.
+    pub(super) fn with_door(mut self, at: Option<&String>, allowed: Allowed) -> Self {
         self.door_at = at.cloned();
+        self.allowed = allowed;
         self
     }
 
@@ -256,20 +233,23 @@ impl Conversation {
                     tick: 0,
                     reason,
                 };
-                if !door.knows(session) {
-                    door.answer(&refused(Reason::OtherSession));
-                } else if let Err(what) = changes(&self.configuration, &configuration) {
-                    door.answer(&refused(Reason::Configuration(what)));
-                    let why = "another model was refused at the door while the robot drives";
-                    said = Ok(Some(format!("{why}: {what}")));
-                } else {
-                    self.configuration = configuration;
-                    let done = self.configure();
-                    door.answer(&match &done {
-                        Ok(()) => Reply::Configured { session },
-                        Err(error) => refused(error.reason()),
-                    });
-                    said = done.map(|()| Some(self.changed()));
+                let taken = self.allowed.change(&self.configuration, configuration);
+                match taken {
+                    _ if !door.knows(session) => door.answer(&refused(Reason::OtherSession)),
+                    Err(what) => {
+                        door.answer(&refused(Reason::Configuration(what)));
+                        let why = "another model was refused at the door while the robot drives";
+                        said = Ok(Some(format!("{why}: {what}")));
+                    }
+                    Ok(configuration) => {
+                        self.configuration = configuration;
+                        let done = self.configure();
+                        door.answer(&match &done {
+                            Ok(()) => Reply::Configured { session },
+                            Err(error) => refused(error.reason()),
+                        });
+                        said = done.map(|()| Some(self.changed()));
+                    }
                 }
             }
             // Nobody but this run moves or stops the robot.
@@ -325,6 +305,7 @@ impl Conversation {
             })?,
         };
         self.sized("commands", act.command.len(), commands)?;
+        self.numbers("commands", &act.command)?;
         Ok(act)
     }
 
@@ -344,6 +325,18 @@ impl Conversation {
             found,
             expected,
         })
+    }
+
+    /// An error if the robot sent what is no number.
+    pub(super) fn numbers(&self, what: &'static str, values: &[f32]) -> Result<(), LineError> {
+        match values.iter().find(|value| !value.is_finite()) {
+            None => Ok(()),
+            Some(found) => Err(LineError::NotFinite {
+                line: self.line.path().to_owned(),
+                what,
+                found: *found,
+            }),
+        }
     }
 
     /// Stops the robot, and waits until it says that it is at rest.

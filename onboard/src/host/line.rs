@@ -137,6 +137,16 @@ pub enum LineError {
         /// How many there should be.
         expected: usize,
     },
+    /// The robot sent what is no number.
+    #[error("the robot at `{line}` sent {found} among its {what}, expected a number")]
+    NotFinite {
+        /// The line.
+        line: String,
+        /// Of what.
+        what: &'static str,
+        /// What it sent.
+        found: f32,
+    },
 }
 
 impl LineError {

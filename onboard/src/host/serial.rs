@@ -105,6 +105,8 @@ impl DriverPart for Serial {
         let configuration = aboard
             .configuration(model, period)
             .map_err(HalfError::Controller)?;
+        let allowed = aboard.changeable.of(model);
+        let allowed = allowed.map_err(HalfError::Controller)?;
         let n = model.plant.controlled.len();
         if let Some(more) = model.measured.get(n) {
             let message = format!(
@@ -115,7 +117,8 @@ impl DriverPart for Serial {
         }
         let line = Line::at(&self.line, self.baud, self.timeout_s);
         let talk = Arc::new(Mutex::new(Talk {
-            robot: Conversation::new(line, configuration, period).with_door(aboard.door.as_ref()),
+            robot: Conversation::new(line, configuration, period)
+                .with_door(aboard.door.as_ref(), allowed),
             act: None,
         }));
         let body = Body {
@@ -188,6 +191,7 @@ impl Body {
         let sensed = act.sensed.as_ref().map_or(&[][..], |s| &s.measured);
         talk.robot
             .sized("measurements", sensed.len(), self.measured.len())?;
+        talk.robot.numbers("measurements", sensed)?;
         widen(&mut self.measured, sensed);
         talk.act = Some(act);
         Ok(true)

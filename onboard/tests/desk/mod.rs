@@ -32,6 +32,8 @@ pub(crate) struct Desk {
     pub(crate) loses: Vec<u32>,
     /// Supply that it measures at its ticks, V.
     pub(crate) supply: fn(u32) -> f32,
+    /// The tick from which on it says that it measures what is no number.
+    pub(crate) mad_from: Option<u32>,
     /// Its periods are those of a clock, whether its host says something or not.
     pub(crate) by_clock: bool,
     ticks: u32,
@@ -69,6 +71,7 @@ impl Desk {
             steps: usize::MAX,
             loses: Vec::new(),
             supply: |_| 12.0,
+            mad_from: None,
             by_clock: false,
             ticks: 0,
         }
@@ -124,6 +127,12 @@ impl Desk {
             .sensed(Some(sensors), &mut |r| said.push(r.clone()));
         let volts = self.robot.output().copied().unwrap_or_default();
         self.measured = body.drive(&volts);
+        if self.mad_from.is_some_and(|from| self.ticks >= from)
+            && let Some(Reply::Act(act)) = said.last_mut()
+            && let Some(sensed) = &mut act.sensed
+        {
+            sensed.measured[0] = f32::NAN;
+        }
         let lost = self.loses.contains(&self.ticks);
         if lost {
             said.pop();

@@ -7,6 +7,8 @@
     reason = "a command that breaks its word is how this program fails"
 )]
 
+mod bounded;
+mod defaults;
 mod files;
 mod logs;
 mod loops;

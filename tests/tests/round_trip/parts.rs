@@ -5,7 +5,7 @@ use loopsight_drivers::{Limit, Replay, SensorFault, Simulated};
 use loopsight_estimators::{Forgetting, RlsSettings};
 use loopsight_model::limits::SignalLimits;
 use loopsight_model::registry::DriverPart;
-use loopsight_model::supervisor::SupervisorSettings;
+use loopsight_model::supervisor::{Supervision, SupervisorSettings};
 use proptest::collection::{btree_map, vec};
 use proptest::option;
 use proptest::prelude::*;
@@ -124,7 +124,14 @@ pub(super) fn limits() -> impl Strategy<Value = SignalLimits> {
         .prop_map(|(magnitude, rate)| SignalLimits { magnitude, rate })
 }
 
-pub(super) fn supervisor() -> impl Strategy<Value = SupervisorSettings> {
+pub(super) fn supervisor() -> impl Strategy<Value = Supervision> {
+    prop_oneof![
+        Just(Supervision::Nobody),
+        settings().prop_map(Supervision::By)
+    ]
+}
+
+fn settings() -> impl Strategy<Value = SupervisorSettings> {
     (
         vec(finite(), 9),
         btree_map(name(), finite(), 0..3),
