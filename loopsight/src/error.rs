@@ -126,7 +126,13 @@ impl Error {
 
     /// An error in a log; `text` is the log as text, where it is at hand.
     pub(crate) fn in_log(error: &RecordingError, file: &str, text: Option<&str>) -> Self {
-        let mut this = Self::request(error.to_string());
+        // A disk that is full is nobody's mistake in the request.
+        let written = matches!(error, RecordingError::Io { action, .. } if *action == "write");
+        let mut this = if written {
+            Self::work(error.to_string())
+        } else {
+            Self::request(error.to_string())
+        };
         this.0.file = Some(file.to_owned());
         let Some((line, field)) = place(error) else {
             return this;
@@ -239,9 +245,10 @@ impl From<RegistryError> for Error {
     }
 }
 
+/// Whether the place can be written is looked at before the work; what goes wrong then is no mistake in the request.
 impl From<ReportError> for Error {
     fn from(error: ReportError) -> Self {
-        Self::request(error.to_string())
+        Self::work(error.to_string())
     }
 }
 

@@ -13,6 +13,7 @@ use loopsight_core::unit::parse;
 
 use crate::error::RecordingError;
 use crate::mcap_log::McapLog;
+use crate::sync::Syncer;
 
 /// The column of a signal: `linear_velocity` in `m/s` is `linear_velocity_m_per_s`.
 ///
@@ -140,7 +141,7 @@ const FLUSH_PERIOD: f64 = 1.0;
 /// Writes a log while it is made.
 ///
 /// Rows go to `NAME.part` beside the target (`NAME.2.part` and so on when an earlier run left
-/// its own there). [`LogWriter::finish`] gives the file its name; dropped before that, the part
+/// its own there), and about once a second they are synced to the disk beside the loop. [`LogWriter::finish`] gives the file its name; dropped before that, the part
 /// stays and can be read.
 pub struct LogWriter {
     target: PathBuf,
@@ -149,6 +150,7 @@ pub struct LogWriter {
     columns: usize,
     /// Time stamp and instant of the last flush.
     flushed: Option<(f64, Instant)>,
+    sync: Syncer,
 }
 
 /// A log in its format.
@@ -170,6 +172,7 @@ impl LogWriter {
     /// [`RecordingError::Io`] when the file cannot be created.
     pub fn create(path: &Path, headers: &[String]) -> Result<Self, RecordingError> {
         let (part, file) = new_part(path)?;
+        let sync = Syncer::of(&file);
         let out = if path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
@@ -192,6 +195,7 @@ impl LogWriter {
             out,
             columns: headers.len(),
             flushed: None,
+            sync,
         })
     }
 
@@ -242,6 +246,7 @@ impl LogWriter {
             Out::Csv { out, .. } => out.flush(),
             Out::Mcap(log) => log.flush().map_err(std::io::Error::other),
         };
+        self.sync.flushed();
         flushed.map_err(|e| io(&self.part, "write", &e))
     }
 
@@ -370,6 +375,28 @@ mod tests {
             panic!("a table")
         };
         assert_eq!(table.runs[0].rows.len(), 500);
+    }
+
+    /// A power cut costs no more than a killed run.
+    #[test]
+    fn a_live_log_is_synced_once_a_second() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["run.csv", "run.mcap"] {
+            let path = folder.path().join(name);
+            let mut log = LogWriter::create(&path, &names(&["time_s", "u_V"])).unwrap();
+            for k in 0..1000 {
+                log.write(&[f64::from(k) * 0.01, 1.0]).unwrap();
+            }
+            assert_eq!(log.sync.done(), 0, "not before a second went by");
+            log.sync.age();
+            log.write(&[20.0, 1.0]).unwrap();
+            let synced = (0..2000).any(|_| {
+                std::thread::sleep(std::time::Duration::from_millis(5));
+                log.sync.done() == 1
+            });
+            assert!(synced, "{name}");
+            log.finish().unwrap();
+        }
     }
 
     /// Also when the buffer is full before it is time to flush.

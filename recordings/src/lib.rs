@@ -37,6 +37,7 @@ mod model_file;
 mod plan;
 mod segment;
 mod source;
+mod sync;
 mod sysid;
 mod table;
 

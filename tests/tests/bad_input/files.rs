@@ -58,3 +58,38 @@ fn places_that_cannot_be_written() {
         .collect();
     assert!(left.is_empty(), "{left:?}");
 }
+
+/// A disk that is full, or a file that may not grow, is no mistake in the request: status 1, and what was done is said.
+#[cfg(unix)]
+#[test]
+fn a_disk_that_is_full() {
+    let desk = super::Desk::new();
+    let long = super::LOOP.replace("duration_s = 1.0", "duration_s = 5.0");
+    desk.write("loop.toml", long);
+    for (arguments, done) in [
+        (
+            &["simulate", "model.toml", "experiment.toml", "-o", "new.csv"][..],
+            "",
+        ),
+        (
+            &["compare", "model.toml", "log.csv", "--html", "new.html"],
+            "Free run: error",
+        ),
+        (&["run", "loop.toml", "-o", "new.csv"], "The loop ran"),
+    ] {
+        // A file of 4 kB is the largest; the signal that says so is ignored, and the write fails.
+        let output = std::process::Command::new("sh")
+            .current_dir(desk.0.path())
+            .args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\""])
+            .arg(super::PROGRAM)
+            .args(arguments)
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let shown = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
+        assert!(text.contains("cannot write"), "{arguments:?}: {text}");
+        assert!(shown.contains(done), "{arguments:?}: {shown}");
+        assert!(!desk.path("new.csv").exists() && !desk.path("new.html").exists());
+    }
+}
