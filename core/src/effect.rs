@@ -34,6 +34,9 @@ pub struct EffectMeta {
     pub parameters: &'static [Parameter],
     /// Acts on all its channels together, as one instance: one supply, one body.
     pub shared_only: bool,
+    /// It acts before the machine, on the way of a command through driver and supply. An input that was
+    /// measured at the machine has gone that way already.
+    pub before_input: bool,
     /// How rare it is: 0 nearly every machine has it, 1 common, 2 rare. Orders explanations that a
     /// recording cannot tell apart.
     pub rarity: u8,
@@ -64,6 +67,7 @@ impl EffectMeta {
         yields_to: &[],
         sided: false,
         shared_only: false,
+        before_input: false,
         rarity: 1,
         simpler: &[],
         parameters: &[],

@@ -126,8 +126,8 @@ impl Candidate {
 /// All candidates for `model`: each effect at every single channel it fits, and at all channels of a
 /// family (both wheels, all inputs), alike and each with its own parameters.
 ///
-/// Left out are effects that the model has at these channels already, and those that act on a signal which is
-/// not measured. An effect that contains one of the model's at the same channels replaces it.
+/// Left out are effects that the model has at these channels already, those that act on a signal which is
+/// not measured, and, where the log's inputs were measured at the machine, those that act before it. An effect that contains one of the model's at the same channels replaces it.
 ///
 /// `rms` are the root mean squares of the plant's signals in the recording. Smoothing widths are set from them:
 /// what suits a robot's wheels does not suit a flywheel. `observed` says that an observer corrects the free
@@ -140,7 +140,8 @@ pub(crate) fn candidates(
 ) -> Vec<Candidate> {
     let sign_width = criteria.sign_width;
     let mut found = Vec::new();
-    for meta in registry::effects() {
+    let possible = |meta: &&EffectMeta| !(model.log.inputs_measured && meta.before_input);
+    for meta in registry::effects().into_iter().filter(possible) {
         for at in channel_sets(model, meta) {
             let present = model
                 .effects

@@ -90,13 +90,15 @@ impl Evidence<'_> {
         nrmse(self.nominal.rank) >= hopeless && left > self.missing().rescued * hopeless
     }
 
-    /// Whether a candidate does better than the plain model on data that neither saw.
+    /// Whether a candidate does better than the plain model on data that neither saw, with parameters that the
+    /// log determines.
     fn earned(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
         let unseen = advantage(self.unseen, &judged.losses, &self.criteria().window);
-        unseen > criteria.beats
+        let better = unseen > criteria.beats
             || (unseen > 0.0 && explanation.significance > criteria.certain)
-            || self.shown_by_starts(judged, explanation)
+            || self.shown_by_starts(judged, explanation);
+        better && determined(explanation, criteria.undetermined)
     }
 
     /// Whether the starts of the runs show it. They judge nothing, since the initial state needs them, and often
@@ -125,7 +127,6 @@ impl Evidence<'_> {
         self.earned(judged, explanation)
             && explanation.significance > criteria.significant
             && (matters || self.shown_by_starts(judged, explanation))
-            && determined(explanation, criteria.undetermined)
     }
 
     /// An explanation that explains the log but not the test recording: the log shows that something is

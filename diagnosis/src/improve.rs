@@ -8,7 +8,7 @@ use crate::fitted::Fit;
 use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
 use crate::progress::{Cancelled, Work};
-use crate::refine::refine;
+use crate::refine::{refine, still_open};
 use crate::settings::{FitSettings, Method};
 use loopsight_model::model::Model;
 
@@ -80,6 +80,7 @@ impl State {
                 round,
                 nrmse_fit: diagnosis.nominal_fit,
                 nrmse_test: diagnosis.nominal.nrmse,
+                still_open: Vec::new(),
             });
             self.present = fitted.clone();
         }
@@ -99,6 +100,7 @@ impl State {
             round,
             nrmse_fit: best.nrmse_fit,
             nrmse_test: best.nrmse,
+            still_open: Vec::new(),
         });
         self.present = best.model;
         let earlier = &self.diagnoses[..round];
@@ -112,9 +114,23 @@ impl State {
         )
     }
 
-    /// Fits the best model to all of the log; a cancelled one stays as it is.
+    /// Says of each step what the data still cannot tell from its effect in the finished `model`.
+    fn tell_open(
+        &mut self,
+        model: &Model,
+        measurements: &Measurements<'_>,
+        work: &Work<'_>,
+    ) -> Result<(), FitError> {
+        let open = still_open(model, &self.steps, &self.diagnoses, measurements, work)?;
+        for (step, open) in self.steps.iter_mut().zip(open) {
+            step.still_open = open;
+        }
+        Ok(())
+    }
+
+    /// Fits the best model to all of the log, and says what is still open; a cancelled one stays as it is.
     fn finish(
-        self,
+        mut self,
         verdict: Conclusion,
         measurements: &Measurements<'_>,
         work: &Work<'_>,
@@ -135,11 +151,19 @@ impl State {
                 done => (Some(done?), verdict),
             },
         };
-        let best = match verdict {
-            Conclusion::Cancelled => {
-                best.or_else(|| self.steps.last().map(|step| unfitted(self.present, step)))
+        let (best, verdict) = match (best, verdict) {
+            (Some(best), verdict) if verdict != Conclusion::Cancelled => {
+                match self.tell_open(&best.model, measurements, work) {
+                    Err(FitError::Cancelled(Cancelled)) => (Some(best), Conclusion::Cancelled),
+                    done => (done.map(|()| Some(best))?, verdict),
+                }
             }
-            _ => best,
+            (best, Conclusion::Cancelled) => {
+                let last = || self.steps.last();
+                let best = best.or_else(|| last().map(|s| unfitted(self.present.clone(), s)));
+                (best, Conclusion::Cancelled)
+            }
+            refused => refused,
         };
         Ok(Improvement {
             steps: self.steps,

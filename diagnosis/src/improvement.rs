@@ -17,6 +17,9 @@ pub struct ImprovementStep {
     pub nrmse_fit: f64,
     /// Free-run error on what it was not fitted to.
     pub nrmse_test: f64,
+    /// What the data cannot tell from it, with all that was added later in the model.
+    #[serde(skip)]
+    pub still_open: Vec<EffectAt>,
 }
 
 /// The result of [`improve`](crate::improve()).
@@ -32,21 +35,4 @@ pub struct Improvement {
     /// The best model, fitted to all of the log; none where a diagnosis was refused.
     #[serde(skip)]
     pub best: Option<Fit>,
-}
-
-impl Improvement {
-    /// What the data could not tell from the effect of a step when it was added.
-    pub fn not_told_from(&self, step: &ImprovementStep) -> Vec<&EffectAt> {
-        let named = self
-            .diagnoses
-            .get(step.round)
-            .and_then(|d| d.candidates.first());
-        let (Some(added), Some(named)) = (&step.added, named) else {
-            return Vec::new();
-        };
-        std::iter::once(&named.place)
-            .chain(&named.indistinguishable_from)
-            .filter(|place| *place != added)
-            .collect()
-    }
 }

@@ -103,11 +103,11 @@ fn reconsidered(
 ) -> Result<(), FitError> {
     let criteria = &best.work.criteria().improve;
     for step in steps {
-        let class = diagnoses.get(step.round).and_then(|d| d.candidates.first());
+        let others = twins(step, diagnoses);
         let Some(place) = step.added.as_mut() else {
             continue;
         };
-        let others = class.iter().flat_map(|c| &c.indistinguishable_from);
+        let others = others.into_iter();
         let candidates =
             others.filter_map(|other| Some((other, exchanged(best.model, place, other)?)));
         if let Some(other) = best.takes(candidates.collect(), criteria.better)? {
@@ -115,6 +115,51 @@ fn reconsidered(
         }
     }
     Ok(())
+}
+
+/// For each of `steps`, what the data still cannot tell from its effect at the end: the twins of its
+/// diagnosis with which the finished `model`, fitted again, would not be beaten. One beats another where its
+/// error is below `improve.better` of the other's, the same ratio that
+/// makes [`refine`] exchange them. A twin that has no place in the model is open no more.
+pub(crate) fn still_open(
+    model: &Model,
+    steps: &[ImprovementStep],
+    diagnoses: &[Diagnosis],
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<Vec<Vec<EffectAt>>, FitError> {
+    let candidates: Vec<(usize, &EffectAt, Model)> = steps
+        .iter()
+        .enumerate()
+        .filter_map(|(index, step)| Some((index, step.added.as_ref()?, twins(step, diagnoses))))
+        .flat_map(|(index, place, twins)| twins.into_iter().map(move |twin| (index, place, twin)))
+        .filter_map(|(index, place, twin)| Some((index, twin, exchanged(model, place, twin)?)))
+        .collect();
+    let mut open = vec![Vec::new(); steps.len()];
+    if candidates.is_empty() {
+        return Ok(open);
+    }
+    let silent = work.silently();
+    let bar = refitted(model, measurements, &silent)?.0 / work.criteria().improve.better;
+    let as_good: Vec<bool> = candidates
+        .par_iter()
+        .map(|(_, _, model)| refitted(model, measurements, &silent).is_ok_and(|(e, _)| e <= bar))
+        .collect();
+    // After a cancellation some were not tried.
+    work.go_on()?;
+    for ((index, twin, _), _) in candidates.iter().zip(as_good).filter(|(_, good)| *good) {
+        open[*index].push((*twin).clone());
+    }
+    Ok(open)
+}
+
+/// What the data could not tell from the effect of a step when it was added.
+fn twins<'a>(step: &ImprovementStep, diagnoses: &'a [Diagnosis]) -> Vec<&'a EffectAt> {
+    let named = diagnoses.get(step.round).and_then(|d| d.candidates.first());
+    let class = named
+        .iter()
+        .flat_map(|n| std::iter::once(&n.place).chain(&n.indistinguishable_from));
+    class.filter(|p| step.added.as_ref() != Some(p)).collect()
 }
 
 /// The model with the effect of `other` in the place of that of `place`; parameters of the same name

@@ -23,6 +23,11 @@ pub struct LogMap {
     /// Column of a run number or name; rows with another value start a new run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run: Option<String>,
+    /// The inputs were measured at the machine, and are no commands: what a driver and a supply make of a command
+    /// is in them, and the effects that stand for it ([`EffectMeta::before_input`](loopsight_core::EffectMeta))
+    /// are no candidates.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub inputs_measured: bool,
     /// Inputs of the plant, by id.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub inputs: BTreeMap<String, ColumnMap>,

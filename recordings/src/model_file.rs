@@ -16,6 +16,11 @@ const PLAUSIBLE_HALF_TRACK: std::ops::RangeInclusive<f64> = 0.1..=1.0;
 /// Wheel radii, m, outside of which something is wrong with the units: from a toy to a tractor.
 const PLAUSIBLE_RADIUS: std::ops::RangeInclusive<f64> = 0.01..=1.0;
 
+/// SysId logs a motor's voltage as its controller puts it out: the duty times the battery's voltage of the time.
+const MEASURED_INPUTS: &str = "# They are voltages at the motor: a supply that sags and a driver's limits are in them.\n\
+     [log]\n\
+     inputs_measured = true\n\n";
+
 impl SysIdLog {
     /// What of the geometry in the log cannot be: the half track from wheels against gyro, the wheel radius
     /// from the units per rotation. The first does not matter as long as only speeds of the wheels are
@@ -132,6 +137,7 @@ impl SysIdLog {
         }
         text.push_str("\n[fit]\nfixed = [\"K_B\", \"K_E\"]\n");
         text.push_str("\n# The inputs are the columns voltage_right_V and voltage_left_V.\n");
+        text.push_str(MEASURED_INPUTS);
         text.push_str(
             "# Speeds come from the motor controller; many filter them and report them late:\n\
              # the effects sensor_delay and sensor_lag say so.\n",
@@ -151,6 +157,7 @@ impl SysIdLog {
 
     fn axis(&self, text: &mut String) {
         text.push_str("[plant.dc_axis]\n\n# The input is the column voltage_V.\n");
+        text.push_str(MEASURED_INPUTS);
         match self.test {
             TestKind::Arm => line(
                 text,

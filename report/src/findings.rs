@@ -146,6 +146,7 @@ pub(crate) fn improvement(last: Conclusion) -> Improvement {
     let best = diagnosis(last).model.is_some().then(fit);
     let step = |added, nrmse_fit, nrmse_test| ImprovementStep {
         round: 0,
+        still_open: Vec::new(),
         added,
         nrmse_fit,
         nrmse_test,

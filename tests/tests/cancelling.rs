@@ -243,7 +243,8 @@ fn an_improvement_keeps_its_finished_steps() {
         assert_eq!(improvement.verdict, Conclusion::Cancelled);
         assert_eq!(improvement.best.is_some(), !improvement.steps.is_empty());
         if let Some(best) = &improvement.best {
-            assert!(best.cancelled && error_of(&best.model, &run) < 1.0);
+            // Its fit may be done, and only what is still open not be known.
+            assert!(error_of(&best.model, &run) < 1.0);
         }
         steps.fetch_max(improvement.steps.len() as u64, Ordering::Relaxed);
     });

@@ -100,6 +100,25 @@ fn a_stronger_motor_and_an_eccentric_encoder_are_found() {
     finds(Hidden::EncoderRipple, 1.0, 3);
 }
 
+/// A dead zone of the driver cannot lie behind the terminals of a motor: where the voltages were measured
+/// there, neither it nor anything else that acts before them is looked for.
+#[test]
+fn what_acts_before_a_measured_input_is_no_candidate() {
+    let log = log(&[(Hidden::DeadZone, 1.0)], Experiment::Prbs, 5);
+    let mut model = model(&log);
+    model.log.inputs_measured = true;
+    let measured = Measurements::new(std::slice::from_ref(&log.run));
+    let found = diagnose(&model, &measured, &Work::quiet()).unwrap();
+    assert!(!found.candidates.is_empty());
+    for candidate in &found.candidates {
+        let id = candidate.place.effect.as_str();
+        assert!(
+            !["dead_zone", "input_saturation", "battery_sag"].contains(&id),
+            "{id}"
+        );
+    }
+}
+
 #[test]
 fn nothing_is_found_where_nothing_is_missing() {
     for (kind, seed) in [(Experiment::Prbs, 11), (Experiment::Mixed, 12)] {

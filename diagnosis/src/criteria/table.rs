@@ -166,7 +166,7 @@ criteria! {
         /// Least share of the standard deviation that it must explain.
         least_share: f64 = 0.004 "1", Judgement: "below it a library finds something for every imperfection of a sensor";
         /// Standard error over the value beyond which the log says nothing of a parameter.
-        undetermined: f64 = 10.0 "1", Judgement: "ten times not pinned";
+        undetermined: f64 = 1.0 "1", Judgement: "not even its sign is known";
         /// Share of the squared error that a quantity of the model predicts on blocks that did not choose it, beyond which it is no noise.
         predicted: f64 = 0.1 "1", Judgement: "of noise a quantity predicts less than nothing, and a model is never quite the machine";
         /// Share of what a constant leaves, to which an effect must bring a model that leaves as much, to be believed.

@@ -90,7 +90,7 @@ pub struct ImproveStep {
     /// Free-run error on what it was not fitted to.
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub nrmse_test: f64,
-    /// What the data could not tell from it when it was added.
+    /// What the data cannot tell from it, with all that was added later in the model.
     pub indistinguishable_from: Vec<EffectAt>,
 }
 
@@ -125,7 +125,7 @@ impl ImproveAnswer {
                 added: step.added.as_ref().map(Into::into),
                 nrmse_fit: step.nrmse_fit,
                 nrmse_test: step.nrmse_test,
-                indistinguishable_from: all(engine.not_told_from(step)),
+                indistinguishable_from: all(&step.still_open),
             })
             .collect();
         let still_open = steps

@@ -53,6 +53,7 @@ impl Effect for BatterySag {
         .or(0.0)
         .nonlinear()
         .scaled(0.001)],
+        before_input: true,
         ..EffectMeta::PLAIN
     };
 

@@ -41,6 +41,7 @@ impl Effect for DeadZone {
                 .nonlinear()
                 .scaled(0.3),
         ],
+        before_input: true,
         ..EffectMeta::PLAIN
     };
 

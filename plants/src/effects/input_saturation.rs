@@ -39,6 +39,7 @@ impl Effect for InputSaturation {
                 .nonlinear()
                 .starting_at(&[1.5, 3.0, 5.0, 8.0, 12.0, 20.0]),
         ],
+        before_input: true,
         ..EffectMeta::PLAIN
     };
 

@@ -65,6 +65,7 @@ fn columns_are_found_by_name_and_converted() {
 fn the_model_file_names_columns_units_and_scales() {
     let text = "stamp,run,u1,w\n0,1,2,3\n1,1,2.5,4\n0,2,2,3\n1,2,2.5,4\n";
     let log_map = LogMap {
+        inputs_measured: false,
         time: Some(column("stamp", Some("s"), 1.0)),
         period_s: None,
         run: None, // a column named `run` is found

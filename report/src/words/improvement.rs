@@ -57,7 +57,7 @@ pub fn said(improvement: &Improvement) -> Said {
         open: improvement
             .steps
             .iter()
-            .filter_map(|step| not_told(improvement, step))
+            .filter_map(not_told)
             .chain(not_pinned(improvement, &added))
             .collect(),
     }
@@ -110,16 +110,12 @@ pub fn added(improvement: &Improvement) -> Vec<EffectAt> {
     }
 }
 
-/// What the data could not tell from the effect of a step.
-fn not_told(improvement: &Improvement, step: &ImprovementStep) -> Option<String> {
-    let others: Vec<String> = improvement
-        .not_told_from(step)
-        .into_iter()
-        .map(place_in_brackets)
-        .collect();
+/// What the data cannot tell from the effect of a step, at the end.
+fn not_told(step: &ImprovementStep) -> Option<String> {
+    let others: Vec<String> = step.still_open.iter().map(place_in_brackets).collect();
     let added = step.added.as_ref().filter(|_| !others.is_empty())?;
     Some(format!(
-        "When {} was added, the data could not tell it from {}.",
+        "The data cannot tell {} from {}.",
         place_in_brackets(added),
         enumerated(&others)
     ))

@@ -341,6 +341,7 @@ proptest! {
         time in option::of(column()),
         period_s in option::of(finite()),
         run in option::of(name()),
+        inputs_measured in any::<bool>(),
         inputs in btree_map(name(), column(), 0..3),
         measured in btree_map(name(), measured(), 0..3),
         max_step_s in option::of(finite()),
@@ -348,7 +349,7 @@ proptest! {
         fixed in vec(name(), 0..3),
     ) {
         same(&Tables {
-            log: LogMap { time, period_s, run, inputs, measured },
+            log: LogMap { time, period_s, run, inputs_measured, inputs, measured },
             simulation: SimulationOptions { max_step_s },
             fit: FitOptions {
                 free,
