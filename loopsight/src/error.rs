@@ -80,6 +80,12 @@ impl Error {
         Self::new(ErrorKind::Work, message)
     }
 
+    /// With what to do about it.
+    pub(crate) fn with_help(mut self, help: String) -> Self {
+        self.0.help = Some(help);
+        self
+    }
+
     /// Who has to do something about it.
     pub fn kind(&self) -> ErrorKind {
         self.0.kind
@@ -151,10 +157,9 @@ impl Error {
 /// Line and field (both from 1) of an error in a log.
 fn place(error: &RecordingError) -> Option<(usize, Option<usize>)> {
     match error {
-        RecordingError::NotANumber { line, column, .. } => Some((*line, Some(*column))),
-        RecordingError::FieldCount { line, .. } | RecordingError::NoHeader { line, .. } => {
-            Some((*line, None))
-        }
+        RecordingError::NotANumber { line, column, .. }
+        | RecordingError::NotATime { line, column, .. } => Some((*line, Some(*column))),
+        RecordingError::FieldCount { line, .. } => Some((*line, None)),
         RecordingError::DuplicateColumn { line, second, .. } => Some((*line, Some(*second))),
         RecordingError::MissingValue { at, .. } | RecordingError::AbsurdValue { at, .. } => {
             at.line.map(|line| (line, Some(at.column_number)))

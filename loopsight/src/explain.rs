@@ -1,4 +1,6 @@
-//! What a part is.
+//! What a part is, and what the tables of a model file say.
+
+mod tables;
 
 use loopsight_core::{EffectMeta, Parameter, PlantMeta, Signal};
 use loopsight_model::config::nearest;
@@ -12,7 +14,7 @@ use crate::answers::{
 use crate::error::{Error, Result};
 
 /// Explains a plant, an effect, an estimator, a controller or a driver by its id: equation, parameters,
-/// channels, reference, example.
+/// channels, reference, example. `log`, `fit` and `simulation` are the tables of a model file, with their keys.
 ///
 /// ```
 /// let answer = loopsight::explain("coulomb_friction")?;
@@ -47,10 +49,14 @@ pub fn explain(id: &str) -> Result<ExplainAnswer> {
     if !found.is_empty() {
         return Ok(ExplainAnswer::new(found));
     }
+    if let Some(meta) = tables::TABLES.iter().find(|m| m.id == id) {
+        return Ok(ExplainAnswer::new(vec![part(meta)]));
+    }
     let mut ids: Vec<&str> = plants.iter().map(|m| m.id).collect();
     ids.extend(effects.iter().map(|m| m.id));
     ids.extend(parts.iter().map(|m| m.id));
     ids.push(written[0].id);
+    ids.extend(tables::TABLES.iter().map(|m| m.id));
     let mut message = format!("nothing is known by the id `{id}`");
     match nearest(id, ids.iter().copied()) {
         Some(near) => message.push_str(&format!("; did you mean `{near}`?")),

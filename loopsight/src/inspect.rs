@@ -1,6 +1,7 @@
 //! What is in a log of another program, and a model file for it.
 
 mod likely;
+pub(crate) mod suggest;
 mod toml;
 
 use loopsight_core::PlantMeta;

@@ -86,6 +86,7 @@ mod check;
 pub mod cli;
 mod columns;
 mod compare;
+mod convert;
 mod diagnose;
 mod error;
 mod experiment;

@@ -13,6 +13,7 @@ pub fn all() -> Vec<(&'static str, Value)> {
         of::<answers::CheckAnswer>(),
         of::<answers::InspectAnswer>(),
         of::<answers::CompareAnswer>(),
+        of::<answers::ConvertAnswer>(),
         of::<answers::DiagnoseAnswer>(),
         of::<answers::ExperimentAnswer>(),
         of::<answers::ExplainAnswer>(),

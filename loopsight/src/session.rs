@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use loopsight_core::Signal;
 use loopsight_diagnosis::Measurements;
+use loopsight_model::log_map::LogMap;
 use loopsight_model::model::Model as Composed;
 use loopsight_model::run::Run;
 use loopsight_recordings::{Fault, Recording, RecordingError, Severity, Source};
@@ -13,6 +14,7 @@ use crate::about::About;
 use crate::answers::LogFault;
 use crate::bounded;
 use crate::error::{Error, Result};
+use crate::inspect::suggest;
 use crate::log::Log;
 use crate::model::Model;
 
@@ -233,7 +235,7 @@ impl Session {
 /// The runs of a log for `model`; signals that the model does not list are found by name, and what is
 /// measured is written into the model.
 fn matched(model: &mut Composed, log: &Log) -> Result<(Vec<Run>, Vec<Fault>)> {
-    let recording = map(model, &log.source).map_err(|error| log.wrong(&error))?;
+    let recording = map(model, &log.source).map_err(|error| unmapped(model, log, &error))?;
     for (i, signal) in recording.measured.iter().enumerate() {
         let mut samples = recording
             .runs
@@ -259,6 +261,28 @@ fn matched(model: &mut Composed, log: &Log) -> Result<(Vec<Run>, Vec<Fault>)> {
     })?;
     bounded::log(&log.name, model, &recording.runs)?;
     Ok((recording.runs, recording.faults))
+}
+
+/// A log that cannot be mapped, with the `[log]` to paste where only columns are missing.
+fn unmapped(model: &Composed, log: &Log, error: &RecordingError) -> Error {
+    let wrong = log.wrong(error);
+    let missing = matches!(
+        error,
+        RecordingError::MissingColumn { .. } | RecordingError::NothingMeasured { .. }
+    );
+    match missing
+        .then(|| suggest::table(model, &log.source))
+        .flatten()
+    {
+        Some(table) => {
+            let place = match model.log == LogMap::default() {
+                true => "in the model file",
+                false => "in the model file, in place of its [log]",
+            };
+            wrong.with_help(format!("this {place} reads the log:\n\n{table}"))
+        }
+        None => wrong,
+    }
 }
 
 /// Maps a log on the signals of a model.

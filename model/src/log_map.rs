@@ -1,7 +1,10 @@
 //! How the columns of a log map on the signals of a model.
 
+mod ranges;
+
 use std::collections::BTreeMap;
 
+pub use ranges::Ranges;
 use serde::{Deserialize, Serialize};
 
 use crate::sensor::Sensor;
@@ -20,6 +23,12 @@ pub struct LogMap {
     /// Time from one row to the next, s, of a log without time stamps.
     #[serde(default, alias = "period", skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
+    /// Rows to use, from 1, both ends included: `[1, 5000]`, or a list of such pairs, each a run.
+    #[serde(default, skip_serializing_if = "Ranges::is_empty")]
+    pub rows: Ranges,
+    /// Times to use, s, as the log's own time stamps say them: `[10, 25]`, or a list of such pairs, each a run.
+    #[serde(default, skip_serializing_if = "Ranges::is_empty")]
+    pub times_s: Ranges,
     /// Column of a run number or name; rows with another value start a new run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run: Option<String>,
@@ -36,6 +45,17 @@ pub struct LogMap {
     pub measured: BTreeMap<String, Measured>,
 }
 
+impl LogMap {
+    /// As it stands in a model file: `[log]` and the tables below it; none where it cannot be written.
+    pub fn to_toml(&self) -> Option<String> {
+        #[derive(Serialize)]
+        struct File<'m> {
+            log: &'m LogMap,
+        }
+        toml::to_string(&File { log: self }).ok()
+    }
+}
+
 /// A column of a log: its name alone, or with unit and scale.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
@@ -47,11 +67,11 @@ pub enum ColumnMap {
 }
 
 /// A column with its conversion: SI value = (value in `unit` as SI) times (`scale` in `scale_unit`
-/// as SI).
+/// as SI) + `offset`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
-    /// Name in the header.
+    /// Name in the header, or a sum or difference of names: `right - left`.
     pub column: String,
     /// Unit when the name does not end with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -62,6 +82,9 @@ pub struct Column {
     /// Unit of `scale` where the column holds what a transducer makes of the signal: `m/V`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale_unit: Option<String>,
+    /// Added at last, in SI: an angle that is counted from elsewhere.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub offset: f64,
     /// How an input runs between its samples.
     #[serde(default, skip_serializing_if = "Hold::is_zero_order")]
     pub hold: Hold,
@@ -100,6 +123,14 @@ fn is_one(value: &f64) -> bool {
     *value == 1.0
 }
 
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "the signature serde asks for"
+)]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 impl ColumnMap {
     /// Name in the header.
     pub fn name(&self) -> &str {
@@ -133,6 +164,14 @@ impl ColumnMap {
         }
     }
 
+    /// What is added at last, in SI.
+    pub fn offset(&self) -> f64 {
+        match self {
+            ColumnMap::Name(_) => 0.0,
+            ColumnMap::Full(column) => column.offset,
+        }
+    }
+
     /// How an input runs between its samples.
     pub fn hold(&self) -> Hold {
         match self {
@@ -146,7 +185,7 @@ impl ColumnMap {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measured {
-    /// Name in the header; by default found by the signal's id.
+    /// Name in the header, or a sum or difference of names; by default found by the signal's id.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub column: Option<String>,
     /// Unit when the name does not end with it.
@@ -158,7 +197,10 @@ pub struct Measured {
     /// Unit of `scale` where the column holds what a transducer makes of the signal: `m/V`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale_unit: Option<String>,
+    /// Added at last, in SI: an angle that is counted from elsewhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
     /// How the number is made.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Sensor::is_default")]
     pub sensor: Sensor,
 }

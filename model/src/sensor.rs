@@ -58,6 +58,11 @@ impl Sensor {
         !matches!(self, Sensor::Instantaneous)
     }
 
+    /// Whether it is what a file need not say.
+    pub(crate) fn is_default(&self) -> bool {
+        *self == Sensor::default()
+    }
+
     /// Name used in reports.
     pub fn name(&self) -> &'static str {
         match self {

@@ -13,7 +13,9 @@ use loopsight_core::unit::{parse, split_name};
 use loopsight_formats::{Channel, Log, Values};
 use loopsight_model::log_map::{Column, ColumnMap, LogMap};
 
-use crate::error::{RecordingError, nearest};
+use crate::derive;
+use crate::error::RecordingError;
+use crate::names::nearest;
 use crate::table::{ColumnName, TIME, Table, TableRun};
 
 /// What WPILib calls the state of a mechanism that is not being tested.
@@ -33,39 +35,42 @@ pub(crate) fn prepare(
     let mut wanted = Wanted::default();
     for signal in inputs {
         let found = match map.inputs.get(signal.id) {
-            Some(column) => Some(finder.named("the input", signal.id, column.name())?),
-            None => finder.by_id(signal.id),
+            Some(column) => Some(finder.sum("the input", signal.id, column.name())?),
+            None => finder.by_id(signal.id).map(|at| finder.alone(at)),
         };
-        let Some(at) = found else {
+        let Some((path, channels)) = found else {
             if signal.optional {
                 continue;
             }
             return Err(finder.missing("the input", signal.id, signal.id));
         };
-        let path = finder.path(at);
         let column = named.inputs.entry(signal.id.to_owned());
         match column.or_insert_with(|| ColumnMap::Name(path.clone())) {
             ColumnMap::Name(name) => *name = path,
             ColumnMap::Full(column) => column.column = path,
         }
-        wanted.held.push(at);
+        wanted.held.extend(channels);
     }
     for signal in signals {
         let entry = map.measured.get(signal.id);
         let found = match entry {
             Some(entry) => {
                 let name = entry.column.as_deref().unwrap_or(signal.id);
-                Some(finder.named("the measured signal", signal.id, name)?)
+                Some(finder.sum("the measured signal", signal.id, name)?)
             }
-            None if map.measured.is_empty() => finder.by_id(signal.id),
+            None if map.measured.is_empty() => {
+                let at = finder.by_id(signal.id);
+                at.filter(|at| !wanted.held.contains(at))
+                    .map(|at| finder.alone(at))
+            }
             None => None,
         };
-        let Some(at) = found.filter(|at| entry.is_some() || !wanted.held.contains(at)) else {
+        let Some((path, channels)) = found else {
             continue;
         };
         let measured = named.measured.entry(signal.id.to_owned()).or_default();
-        measured.column = Some(finder.path(at));
-        wanted.measured.push(at);
+        measured.column = Some(path);
+        wanted.measured.extend(channels);
     }
     if let Some(name) = &map.run {
         let at = finder.named("the run", name, name)?;
@@ -175,6 +180,33 @@ impl Finder<'_> {
         self.by_id(name).ok_or_else(|| self.missing(role, id, name))
     }
 
+    /// The channels of a name, or of a sum of names, and what the sum is called by their paths.
+    fn sum(
+        &self,
+        role: &'static str,
+        id: &str,
+        name: &str,
+    ) -> Result<(String, Vec<usize>), RecordingError> {
+        if let Some(at) = self.by_id(name) {
+            return Ok(self.alone(at));
+        }
+        let Some(terms) = derive::terms(name) else {
+            return Err(self.missing(role, id, name));
+        };
+        let mut paths = Vec::new();
+        let mut channels = Vec::new();
+        for (sign, term) in terms {
+            let at = self.named(role, id, term)?;
+            paths.push((sign, self.path(at)));
+            channels.push(at);
+        }
+        Ok((derive::text(&paths), channels))
+    }
+
+    fn alone(&self, at: usize) -> (String, Vec<usize>) {
+        (self.path(at), vec![at])
+    }
+
     /// The channel with this path, or the one whose path ends so.
     fn by_id(&self, id: &str) -> Option<usize> {
         self.log.position(id).or_else(|| self.ending(id))
@@ -256,6 +288,7 @@ fn rows(log: &Log, columns: &[usize], n: usize) -> Table {
         labels: labels(&channels),
         own_clocks: false,
         cut: cut(log).unwrap_or_default(),
+        stamps: None,
     }
 }
 
@@ -383,5 +416,6 @@ fn on_all_stamps(log: &Log, wanted: &Wanted) -> Table {
         labels: labels.into_iter().map(|(at, w)| (at + 1, w)).collect(),
         own_clocks: true,
         cut: cut(log).unwrap_or_default(),
+        stamps: None,
     }
 }

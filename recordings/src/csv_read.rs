@@ -1,14 +1,19 @@
 //! CSV in: a header of names with units, then numbers.
 //!
-//! Fields are separated by commas, semicolons or tabs, whichever the header has most of; lines
-//! that begin with `#` are comments. An empty field, `nan`, `na` or `null` is a missing value. A
-//! column without a unit whose first field is a word is a column of words (a run's name, a mode).
+//! Fields are separated by commas, semicolons or tabs, whichever the header has most of, or by spaces;
+//! lines that begin with `#` are comments. An empty field, `nan`, `na` or `null` is a missing value. A
+//! column without a unit whose first field is a word is a column of words (a run's name, a mode), one
+//! whose first field is a date or a time is a column of times, in seconds since its first. Units may
+//! stand at the end of names, in brackets, or on a line of their own below the names. Without a header
+//! columns are called `column 1`, `column 2`.
 
 use std::collections::BTreeMap;
 use std::io::Read;
 
+use crate::dialect::{self, delimiter, number};
 use crate::error::RecordingError;
 use crate::source::as_text;
+use crate::stamp::nanoseconds;
 use crate::table::{ColumnName, Table, TableRun};
 
 /// Reads CSV from anywhere; `source_name` is what errors call it.
@@ -29,6 +34,8 @@ pub fn read_csv_from(mut reader: impl Read, source_name: &str) -> Result<Table, 
 }
 
 pub(crate) fn parse_csv(text: &str, log: &str) -> Result<Table, RecordingError> {
+    let spaced = dialect::tabs_for_spaces(text);
+    let text = &*spaced;
     let delimiter = delimiter(text);
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
@@ -43,9 +50,15 @@ pub(crate) fn parse_csv(text: &str, log: &str) -> Result<Table, RecordingError> 
         line: 1,
     };
     let mut record = csv::StringRecord::new();
-    let mut columns: Vec<ColumnName> = Vec::new();
-    let mut labels: BTreeMap<usize, Vec<String>> = BTreeMap::new();
-    let mut run = TableRun::default();
+    let mut rows = Rows {
+        log,
+        delimiter,
+        columns: Vec::new(),
+        labels: BTreeMap::new(),
+        origins: BTreeMap::new(),
+        run: TableRun::default(),
+        named: true,
+    };
     while reader
         .read_record(&mut record)
         .map_err(|e| RecordingError::Io {
@@ -58,41 +71,16 @@ pub(crate) fn parse_csv(text: &str, log: &str) -> Result<Table, RecordingError> 
         if record.iter().all(str::is_empty) && record.len() <= 1 {
             continue;
         }
-        if columns.is_empty() {
-            columns = header(&record, log, line)?;
-            continue;
-        }
-        if record.len() != columns.len() {
-            return Err(RecordingError::FieldCount {
-                log: log.into(),
-                line,
-                expected: columns.len(),
-                found: record.len(),
-            });
-        }
-        let first = run.lines.is_empty();
-        run.lines.push(line);
-        for (at, (field, column)) in record.iter().zip(&columns).enumerate() {
-            let value = match (labels.get_mut(&at), number(field, delimiter)) {
-                (Some(words), _) => index_of(words, field),
-                (None, Some(value)) => value,
-                (None, None) if first && column.unit.is_none() => {
-                    labels.insert(at, vec![field.to_owned()]);
-                    0.0
-                }
-                (None, None) => {
-                    return Err(RecordingError::NotANumber {
-                        log: log.into(),
-                        line,
-                        column: at + 1,
-                        name: column.text.as_str().into(),
-                        text: field.into(),
-                    });
-                }
-            };
-            run.rows.push(value);
-        }
+        rows.record(&record, line)?;
     }
+    let Rows {
+        columns,
+        labels,
+        origins,
+        mut run,
+        named,
+        ..
+    } = rows;
     if columns.is_empty() {
         return Err(RecordingError::Empty { log: log.into() });
     }
@@ -100,13 +88,131 @@ pub(crate) fn parse_csv(text: &str, log: &str) -> Result<Table, RecordingError> 
         .lines
         .first()
         .ok_or_else(|| RecordingError::HeaderOnly { log: log.into() })?;
+    let width = columns.len().max(1);
+    let rows: Vec<&[f64]> = run.rows.chunks_exact(width).collect();
+    let rising = !named && width > 1 && rows.windows(2).all(|w| w[0][0] < w[1][0]);
     Ok(Table {
         source: log.into(),
         columns,
         runs: vec![run],
         labels,
+        stamps: origins.into_keys().next().or(rising.then_some(0)),
         ..Table::default()
     })
+}
+
+/// What was read so far.
+struct Rows<'l> {
+    log: &'l str,
+    delimiter: u8,
+    columns: Vec<ColumnName>,
+    labels: BTreeMap<usize, Vec<String>>,
+    /// Columns of dates and times, and the first of each, ns.
+    origins: BTreeMap<usize, i64>,
+    run: TableRun,
+    /// There is a header.
+    named: bool,
+}
+
+impl Rows<'_> {
+    fn record(&mut self, record: &csv::StringRecord, line: usize) -> Result<(), RecordingError> {
+        if self.columns.is_empty() {
+            let said = record
+                .get(0)
+                .is_some_and(|f| f.len() <= 5 && f.to_lowercase().starts_with("sep="));
+            if said {
+                return Ok(());
+            }
+            if !dialect::is_data(record, self.delimiter) {
+                self.columns = header(record, self.log, line)?;
+                return Ok(());
+            }
+            self.named = false;
+            let numbers = 1..=record.len();
+            self.columns = numbers
+                .map(|n| ColumnName::new(&format!("column {n}")))
+                .collect();
+        }
+        // A separator at the end of each row closes its last field, and opens none.
+        let n = self.columns.len();
+        let closed = record.len() == n + 1 && record.get(n) == Some("");
+        if record.len() != n && !closed {
+            return Err(RecordingError::FieldCount {
+                log: self.log.into(),
+                line,
+                expected: n,
+                found: record.len(),
+            });
+        }
+        if self.run.lines.is_empty()
+            && let Some(units) = dialect::units(record)
+        {
+            for (column, unit) in self.columns.iter_mut().zip(units) {
+                column.unit = unit.or(column.unit.take());
+            }
+            return Ok(());
+        }
+        let first = self.run.lines.is_empty();
+        self.run.lines.push(line);
+        for (at, field) in record.iter().take(n).enumerate() {
+            let value = self.value(at, field, first, line)?;
+            self.run.rows.push(value);
+        }
+        Ok(())
+    }
+
+    fn value(
+        &mut self,
+        at: usize,
+        field: &str,
+        first: bool,
+        line: usize,
+    ) -> Result<f64, RecordingError> {
+        if let Some(words) = self.labels.get_mut(&at) {
+            return Ok(index_of(words, field));
+        }
+        if let Some(origin) = self.origins.get(&at) {
+            if field.is_empty() {
+                return Ok(f64::NAN);
+            }
+            let since = |now: i64| Some(now.checked_sub(*origin)? as f64 / 1e9);
+            return nanoseconds(field)
+                .and_then(since)
+                .ok_or_else(|| RecordingError::NotATime {
+                    log: self.log.into(),
+                    line,
+                    column: at + 1,
+                    name: self.name(at).into(),
+                    text: field.into(),
+                });
+        }
+        if let Some(value) = number(field, self.delimiter) {
+            return Ok(value);
+        }
+        if let Some(origin) = nanoseconds(field).filter(|_| first) {
+            self.origins.insert(at, origin);
+            if let Some(column) = self.columns.get_mut(at) {
+                column.unit = Some("s".to_owned());
+            }
+            return Ok(0.0);
+        }
+        let bare = self.columns.get(at).is_some_and(|c| c.unit.is_none());
+        if first && bare {
+            self.labels.insert(at, vec![field.to_owned()]);
+            return Ok(0.0);
+        }
+        Err(RecordingError::NotANumber {
+            log: self.log.into(),
+            line,
+            column: at + 1,
+            name: self.name(at).into(),
+            text: field.into(),
+        })
+    }
+
+    fn name(&self, at: usize) -> &str {
+        self.columns.get(at).map_or("", |c| c.text.as_str())
+    }
 }
 
 fn header(
@@ -114,13 +220,6 @@ fn header(
     log: &str,
     line: usize,
 ) -> Result<Vec<ColumnName>, RecordingError> {
-    if record.iter().all(|field| number(field, b',').is_some()) {
-        return Err(RecordingError::NoHeader {
-            log: log.into(),
-            line,
-            text: record.iter().collect::<Vec<_>>().join(",").into(),
-        });
-    }
     let mut columns: Vec<ColumnName> = Vec::with_capacity(record.len());
     for (at, field) in record.iter().enumerate() {
         // A table written with its row numbers has no name above them.
@@ -140,34 +239,6 @@ fn header(
         columns.push(column);
     }
     Ok(columns)
-}
-
-/// The separator that the header has most of.
-fn delimiter(text: &str) -> u8 {
-    let header = text
-        .lines()
-        .find(|line| !line.trim().is_empty() && !line.starts_with('#'));
-    let count = |d: u8| header.map_or(0, |h| h.bytes().filter(|b| *b == d).count());
-    // `max_by_key` takes the last of equals: the comma.
-    [b'\t', b';', b',']
-        .into_iter()
-        .max_by_key(|d| count(*d))
-        .unwrap_or(b',')
-}
-
-fn number(field: &str, delimiter: u8) -> Option<f64> {
-    if ["", "na", "n/a", "null", "none"]
-        .iter()
-        .any(|m| field.eq_ignore_ascii_case(m))
-    {
-        return Some(f64::NAN);
-    }
-    match field.parse() {
-        Ok(value) => Some(value),
-        // Decimal commas, where the comma does not separate.
-        Err(_) if delimiter != b',' => field.replacen(',', ".", 1).parse().ok(),
-        Err(_) => None,
-    }
 }
 
 fn index_of(words: &mut Vec<String>, field: &str) -> f64 {
@@ -259,8 +330,8 @@ mod tests {
                 "l.csv:4: column 2 (`u`): expected a number, found `x`",
             ),
             (
-                "0,1\n1,2\n",
-                "l.csv:1: no header: the first line holds only numbers (`0,1`)",
+                "time,u\n12:00:00.5,1\nlater,2\n",
+                "l.csv:3: column 1 (`time`): expected a date and time as in `2024-05-01T12:00:00.125Z`, found `later`",
             ),
             (
                 "t_s,u_V,t_s\n0,1,2\n",
@@ -271,6 +342,42 @@ mod tests {
         ] {
             assert!(error(text).starts_with(says), "{} | {says}", error(text));
         }
+    }
+
+    #[test]
+    fn without_a_header_columns_have_numbers() {
+        let table = parse_csv("0,1\n0.5,2\n", "l").unwrap();
+        assert_eq!(table.column_texts(), ["column 1", "column 2"]);
+        assert_eq!(table.runs[0].rows, [0.0, 1.0, 0.5, 2.0]);
+        assert_eq!((table.runs[0].first_line, table.stamps), (1, Some(0)));
+        let table = parse_csv("0,5;1,25\n1,0;2,5\n", "l").unwrap();
+        assert_eq!(table.runs[0].rows, [0.5, 1.25, 1.0, 2.5]);
+    }
+
+    #[test]
+    fn dates_and_times_are_seconds_since_the_first() {
+        let text = "when,u_V\n2024-05-01T12:00:00.100Z,1\n2024-05-01T12:00:00.350Z,2\n";
+        let table = parse_csv(text, "l").unwrap();
+        assert_eq!(table.runs[0].rows, [0.0, 1.0, 0.25, 2.0]);
+        assert_eq!(
+            (table.stamps, table.columns[0].unit.as_deref()),
+            (Some(0), Some("s"))
+        );
+    }
+
+    #[test]
+    fn what_spreadsheets_and_plotters_write() {
+        let table = parse_csv("sep=;\nTime;Speed;\n(ms);(rpm);\n1,5;30;\n2;60;\n", "l").unwrap();
+        assert_eq!(table.columns[1].unit.as_deref(), Some("rpm"));
+        assert_eq!((table.runs[0].first_line, table.runs[0].rows[0]), (4, 1.5));
+        let table = parse_csv("# gnuplot\n  t_s   u_V\n 0.0   1\n 0.5  -2\n", "l").unwrap();
+        assert_eq!(table.column_texts(), ["t_s", "u_V"]);
+        assert_eq!(table.runs[0].rows, [0.0, 1.0, 0.5, -2.0]);
+        let table = parse_csv("t [ms],speed (rpm)\n0,1\n", "l").unwrap();
+        assert_eq!(table.columns[1].name, "speed");
+        assert_eq!(table.columns[0].unit.as_deref(), Some("ms"));
+        let table = parse_csv("t_s,u_V\n0,1,\n1,2,\n", "l").unwrap();
+        assert_eq!(table.runs[0].rows, [0.0, 1.0, 1.0, 2.0]);
     }
 
     #[test]

@@ -7,6 +7,8 @@ use std::path::PathBuf;
 use loopsight_core::unit::{Dimension, UnitError};
 use loopsight_formats::FormatError;
 
+use crate::names::{did_you_mean, list};
+
 /// Where in a log a value stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Location {
@@ -159,18 +161,6 @@ pub enum RecordingError {
         /// What it is.
         found: Box<str>,
     },
-    /// The first line holds numbers.
-    #[error(
-        "{log}:{line}: no header: the first line holds only numbers (`{text}`); expected names with units, as in `time_s,voltage_V,speed_rad_per_s`"
-    )]
-    NoHeader {
-        /// The file.
-        log: Box<str>,
-        /// Line, from 1.
-        line: usize,
-        /// The line.
-        text: Box<str>,
-    },
     /// Two columns of one name.
     #[error("{log}:{line}: columns {first} and {second} are both named `{name}`")]
     DuplicateColumn {
@@ -206,6 +196,22 @@ pub enum RecordingError {
     /// A field that is no number.
     #[error("{log}:{line}: column {column} (`{name}`): expected a number, found `{text}`")]
     NotANumber {
+        /// The file.
+        log: Box<str>,
+        /// Line, from 1.
+        line: usize,
+        /// Number of the column, from 1.
+        column: usize,
+        /// Its header.
+        name: Box<str>,
+        /// The field.
+        text: Box<str>,
+    },
+    /// A field of a column of dates and times that is none.
+    #[error(
+        "{log}:{line}: column {column} (`{name}`): expected a date and time as in `2024-05-01T12:00:00.125Z`, found `{text}`"
+    )]
+    NotATime {
         /// The file.
         log: Box<str>,
         /// Line, from 1.
@@ -277,6 +283,56 @@ pub enum RecordingError {
         /// Its values.
         found: usize,
     },
+    /// Nothing but runs of one row.
+    #[error(
+        "{log}: one row{} is no recording; expected rows at least two sampling periods long{}",
+        if *runs > 1 { format!(" in each of {runs} runs") } else { String::new() },
+        if *runs > 1 { "; is the column of the time, or of the run, another one?" } else { "" }
+    )]
+    OneRow {
+        /// The file.
+        log: Box<str>,
+        /// Number of runs, each of one row.
+        runs: usize,
+    },
+    /// Time stamps that are no seconds.
+    #[error(
+        "{log}: {at}: the time {stamp} is taken as seconds, which is after the year 5000; in {unit} it is a time of these years: say `time = {{ column = \"{}\", unit = \"{unit}\" }}` in the model's [log]", at.column
+    )]
+    NotSeconds {
+        /// The file.
+        log: Box<str>,
+        /// Where.
+        at: Box<Location>,
+        /// The stamp, s.
+        stamp: f64,
+        /// What it seems to be in.
+        unit: &'static str,
+    },
+    /// A part of a log without a row.
+    #[error(
+        "{log}: [log] {key} = [{from}, {to}] has no row; the log has {} to {}", span.0, span.1
+    )]
+    EmptyPart {
+        /// The file.
+        log: Box<str>,
+        /// `rows` or `times_s`.
+        key: &'static str,
+        /// Where it begins.
+        from: f64,
+        /// Where it ends.
+        to: f64,
+        /// What the log has, from and to.
+        span: (f64, f64),
+    },
+    /// Rows of a log whose channels have none in common.
+    #[error(
+        "{log}: [log] rows: its channels have time stamps of their own and no rows in common; say `times_s = [from, to]`"
+    )]
+    RowsOfClocks {
+        /// The file.
+        log: Box<str>,
+    },
     /// Most rows are earlier than the one before.
     #[error(
         "{log}: time runs backwards: in `{column}` {back} of {rows} rows are earlier than the row before; sort the rows by time, or name another column as `time` in the model's [log]"
@@ -294,6 +350,11 @@ pub enum RecordingError {
     /// A log of another program that cannot be read.
     #[error(transparent)]
     Format(Box<FormatError>),
+    /// Two things that stamp the rows.
+    #[error(
+        "[log] has both `time` and `period_s`: a log has time stamps or even rows; leave one of them out"
+    )]
+    TimeTwice,
     /// A period that is none.
     #[error("[log] period_s = {period}: expected a time above 0")]
     BadPeriod {
@@ -371,7 +432,9 @@ pub enum RecordingError {
         scale: f64,
     },
     /// A column of words where numbers are needed.
-    #[error("{log}: {at}: `{id}` needs numbers, found the text `{text}`")]
+    #[error(
+        "{log}: {at}: `{id}` needs numbers, found the text `{text}`; name another column for it in the model's [log]"
+    )]
     TextColumn {
         /// The file.
         log: Box<str>,
@@ -408,59 +471,9 @@ impl From<FormatError> for RecordingError {
     }
 }
 
-/// `; did you mean …?`, or nothing.
-fn did_you_mean(nearest: &Option<Box<str>>) -> String {
-    nearest
-        .as_ref()
-        .map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
-}
-
-fn list(names: &[String]) -> String {
-    if names.is_empty() {
-        return "none".into();
-    }
-    names
-        .iter()
-        .map(|name| format!("`{name}`"))
-        .collect::<Vec<_>>()
-        .join(", ")
-}
-
-/// Less alike than this, a name is no suggestion.
-const ALIKE: f64 = 0.5;
-
-/// The candidate most like `name`, if any is.
-pub(crate) fn nearest<'c>(
-    name: &str,
-    candidates: impl IntoIterator<Item = &'c str>,
-) -> Option<Box<str>> {
-    let name = name.to_lowercase();
-    candidates
-        .into_iter()
-        .map(|c| {
-            (
-                strsim::normalized_damerau_levenshtein(&name, &c.to_lowercase()),
-                c,
-            )
-        })
-        .filter(|(alike, _)| *alike >= ALIKE)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, c)| c.into())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_nearest_name_is_found_or_none() {
-        let names = ["voltage_right_V", "voltage_left_V", "time_s"];
-        assert_eq!(
-            nearest("Voltage_rigth", names).as_deref(),
-            Some("voltage_right_V")
-        );
-        assert_eq!(nearest("heading", names), None);
-    }
 
     #[test]
     fn a_location_has_a_line_or_a_row() {

@@ -5,6 +5,7 @@ use loopsight_formats::{Kind, Log, Values};
 
 use crate::channels::{cut, last};
 use crate::median::median;
+use crate::naming::{self, brackets};
 use crate::source::Source;
 use crate::table::Table;
 
@@ -146,7 +147,8 @@ fn of_channels(log: &Log) -> Inventory {
 
 fn of_table(table: &Table, format: &str) -> Inventory {
     let width = table.columns.len().max(1);
-    let time = table.columns.iter().position(|c| is_time(&c.name));
+    let time = table.stamps;
+    let time = time.or_else(|| table.columns.iter().position(|c| is_time(&c.name)));
     let seconds = |column: usize| {
         let unit = table.columns.get(column)?.unit.as_deref()?;
         parse(unit).ok().map(|u| u.factor)
@@ -177,7 +179,11 @@ fn of_table(table: &Table, format: &str) -> Inventory {
             declared: String::new(),
             unit: column.unit.clone().map(|unit| UnitFact {
                 unit,
-                why: "the end of the name",
+                why: match brackets(&column.text) {
+                    Some(_) => "the brackets at the end of the name",
+                    None if naming::split(&column.text).1.is_none() => "the file says so",
+                    None => "the end of the name",
+                },
             }),
             values: all().count(),
             missing,
@@ -227,17 +233,8 @@ fn unit(declared: Option<&str>, path: &str) -> Option<UnitFact> {
     if let (_, Some(unit)) = split_name(name) {
         return Some(fact(unit, "the end of the name"));
     }
-    // `Left Encoder Speed (M/s)`: its last part is `s)`.
-    for (open, close) in [('(', ')'), ('[', ']')] {
-        let inside = path.strip_suffix(close).and_then(|p| p.rsplit_once(open));
-        if let Some((_, text)) = inside {
-            let lower = text.to_lowercase();
-            // An index is no unit.
-            let is_unit = |u: &&str| u.contains(char::is_alphabetic) && parse(u).is_ok();
-            if let Some(unit) = [text, lower.as_str()].into_iter().find(is_unit) {
-                return Some(fact(unit, "the brackets at the end of the name"));
-            }
-        }
+    if let Some((_, unit)) = brackets(path) {
+        return Some(fact(&unit, "the brackets at the end of the name"));
     }
     let words = name.to_lowercase();
     let guesses = [

@@ -1,5 +1,7 @@
 //! From the columns of a file to the signals of a model.
 
+mod short;
+
 use std::collections::BTreeMap;
 
 use loopsight_core::Signal;
@@ -15,10 +17,12 @@ use crate::segment::{Segments, segment};
 use crate::source::Source;
 use crate::table::{Table, TableRun};
 
+/// One row in so many that repeats a time stamp: the rows came in bursts.
+const BURSTS: usize = 3;
+/// Stamps beyond this, s since 1970, are in another unit.
+const NO_SECONDS: f64 = 1e11;
 /// Values of this magnitude or more, in SI units, are no measurements.
 pub(crate) const ABSURD: f64 = 1e9;
-/// Runs shorter than this, s, are left out.
-pub(crate) const SHORT_RUN: f64 = 1.0;
 
 /// Measurements in SI units, in the order of a model's signals, and what is wrong with them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,8 +72,9 @@ pub fn map(
 ) -> Result<Recording, RecordingError> {
     let (table, map) = source.table_for(plant_inputs, plant_signals, map)?;
     let plan = Plan::new(&table, plant_inputs, plant_signals, &map)?;
+    let used = table.parts(plan.time, &map)?;
     let mut mapper = Mapper::new(&table, &plan);
-    for run in &table.runs {
+    for run in &*used {
         mapper.run(run)?;
     }
     let (runs, mut found) = mapper.finish()?;
@@ -213,6 +218,7 @@ impl<'a> Mapper<'a> {
         for at in range {
             let stamp = rows[at][time.column];
             self.check(run, at, time, stamp, "the time")?;
+            self.seconds(run, at, stamp * time.factor)?;
             let shifted = self.exact((stamp - origin) * time.factor);
             self.limit(run, at, time, shifted)?;
             times.push((at, shifted));
@@ -298,11 +304,11 @@ impl<'a> Mapper<'a> {
             };
             let value = row[link.column];
             self.check(run, at, *link, value, "an input")?;
-            self.limit(run, at, *link, value * link.factor)?;
-            inputs.values.push(value * link.factor);
+            self.limit(run, at, *link, link.si(value))?;
+            inputs.values.push(link.si(value));
         }
         for (signal, (link, _)) in plan.measured.iter().enumerate() {
-            let mut value = row[link.column] * link.factor;
+            let mut value = link.si(row[link.column]);
             let place = || self.table.location(run, at, link.column).to_string();
             if value.is_nan() {
                 self.missing[signal].add(place);
@@ -332,6 +338,22 @@ impl<'a> Mapper<'a> {
             });
         }
         Ok(())
+    }
+
+    /// Milliseconds since 1970 or less, taken as seconds, are no times that anybody measured at.
+    fn seconds(&self, run: &TableRun, at: usize, stamp: f64) -> Result<(), RecordingError> {
+        let unit = match stamp {
+            s if (NO_SECONDS..NO_SECONDS * 1e3).contains(&s) => "ms",
+            s if (NO_SECONDS * 1e3..NO_SECONDS * 1e6).contains(&s) => "us",
+            s if (NO_SECONDS * 1e6..NO_SECONDS * 1e9).contains(&s) => "ns",
+            _ => return Ok(()),
+        };
+        Err(RecordingError::NotSeconds {
+            log: self.table.source.as_str().into(),
+            at: Box::new(self.table.location(run, at, self.plan.time.column)),
+            stamp,
+            unit,
+        })
     }
 
     fn limit(
@@ -375,6 +397,12 @@ impl<'a> Mapper<'a> {
                 rows: self.rows,
             });
         }
+        if self.runs.iter().all(|run| run.len() < 2) && self.rows > 0 {
+            return Err(RecordingError::OneRow {
+                log: self.table.source.as_str().into(),
+                runs: self.runs.len(),
+            });
+        }
         let mut push = |kind, run: String, signal: &str, detail: String| {
             faults.push(Fault {
                 kind,
@@ -385,11 +413,19 @@ impl<'a> Mapper<'a> {
         };
         let Tally { count, first } = &self.duplicates;
         if *count > 0 {
-            let detail = format!(
+            let mut detail = format!(
                 "{count} of {} rows repeat the time stamp before and were left out, the first \
                  at {first}",
                 self.rows
             );
+            let duration: f64 = self.runs.iter().map(Run::duration).sum();
+            if BURSTS * count >= self.rows && duration > 0.0 {
+                let period = duration / (self.rows - self.runs.len()).max(1) as f64;
+                detail.push_str(&format!(
+                    "; so many rows at one stamp were stamped when they arrived, not when they were measured: \
+                     `period_s = {period:.3e}` in place of `time` in the model's [log] uses all of them, evenly"
+                ));
+            }
             push(FaultKind::DuplicateTime, String::new(), time, detail);
         }
         let (back, restarts) = (&self.backwards, &self.restarts);
@@ -448,51 +484,10 @@ impl<'a> Mapper<'a> {
                 detail,
             );
         }
-        let (runs, short) = without_short_runs(self.runs);
+        let (runs, short) = short::without_short_runs(self.runs);
         faults.extend(short);
         Ok((runs, faults))
     }
-}
-
-/// Leaves out the short runs where the others are enough.
-fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
-    let is_short = |run: &Run| run.duration() < SHORT_RUN;
-    let list = runs
-        .iter()
-        .enumerate()
-        .filter(|(_, run)| is_short(run))
-        .map(|(i, run)| match run.name() {
-            "" if runs.len() == 1 => format!("{:.2} s", run.duration()),
-            "" => format!("run {} {:.2} s", i + 1, run.duration()),
-            name => format!("`{name}` {:.2} s", run.duration()),
-        })
-        .collect::<Vec<_>>();
-    if list.is_empty() {
-        return (runs, None);
-    }
-    let moves = |run: &Run| (0..run.n_measured()).any(|s| faults::moves(run, s));
-    let enough = runs.iter().any(|run| !is_short(run) && moves(run));
-    let keep = !enough && runs.iter().any(|run| is_short(run) && moves(run));
-    let names: Vec<&str> = runs
-        .iter()
-        .filter(|run| is_short(run))
-        .map(|run| run.name())
-        .collect();
-    let (what, all_short) = (list.join(", "), names.len() == runs.len());
-    let shorter = format!("shorter than {SHORT_RUN} s: {what}");
-    let detail = match (all_short, keep) {
-        (true, _) => format!("every run is {shorter}"),
-        (_, true) => format!("{shorter}; kept, since nothing moves in the longer runs"),
-        _ => format!("{shorter}; left out"),
-    };
-    let fault = Fault {
-        kind: FaultKind::ShortRun,
-        run: run_names(&names, runs.len()),
-        signal: String::new(),
-        detail,
-    };
-    let long = |run: &Run| all_short || keep || !is_short(run);
-    (runs.into_iter().filter(long).collect(), Some(fault))
 }
 
 #[cfg(test)]

@@ -4,16 +4,26 @@ use loopsight_core::Signal;
 use loopsight_core::unit::{Unit, conversion, parse};
 use loopsight_model::log_map::LogMap;
 
-use crate::error::{RecordingError, nearest};
+use crate::error::RecordingError;
 use crate::fault::{Fault, FaultKind};
 use crate::map::MappedSignal;
-use crate::table::Table;
+use crate::names::nearest;
+use crate::naming;
+use crate::table::{ColumnName, Table};
 
-/// A column and the factor to the SI unit of its signal.
+/// A column and how it becomes the SI unit of its signal: `value · factor + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Link {
     pub(crate) column: usize,
     pub(crate) factor: f64,
+    pub(crate) offset: f64,
+}
+
+impl Link {
+    /// A value of the column in SI.
+    pub(crate) fn si(self, value: f64) -> f64 {
+        value * self.factor + self.offset
+    }
 }
 
 /// Everything a model takes from a log.
@@ -34,6 +44,7 @@ struct Wish<'m> {
     unit: Option<&'m str>,
     scale: Option<f64>,
     scale_unit: Option<&'m str>,
+    offset: f64,
 }
 
 impl Plan {
@@ -52,7 +63,13 @@ impl Plan {
         let time = finder.time(map)?;
         let run = match &map.run {
             Some(name) => Some(find(table, name).map(|(column, _)| column).ok_or_else(|| {
-                finder.missing("the run", name, format!("a column named `{name}`"), name)
+                missing(
+                    table,
+                    "the run",
+                    name,
+                    format!("a column named `{name}`"),
+                    name,
+                )
             })?),
             None => table.columns.iter().position(|c| c.text == "run"),
         };
@@ -66,6 +83,7 @@ impl Plan {
                     unit: c.unit(),
                     scale: Some(c.scale()),
                     scale_unit: c.scale_unit(),
+                    offset: c.offset(),
                 });
             let absent = signal.optional && find(table, wish.column.unwrap_or(signal.id)).is_none();
             let link = match absent {
@@ -94,6 +112,7 @@ impl Plan {
                 unit: m.unit.as_deref(),
                 scale: m.scale,
                 scale_unit: m.scale_unit.as_deref(),
+                offset: m.offset.unwrap_or(0.0),
             });
             let link = finder.signal("the measured signal", signal, wish)?;
             let measured_signal = MappedSignal {
@@ -139,15 +158,55 @@ fn known<'m>(
 }
 
 /// The column of this name, with the rest of its header as the unit: the whole header first,
-/// then the name, an underscore and anything that is a unit.
-fn find<'t>(table: &'t Table, name: &str) -> Option<(usize, Option<&'t str>)> {
+/// then the name, an underscore and anything that is a unit, then the name with a unit in brackets, at
+/// last the one that differs in small and large letters or spaces only.
+pub(crate) fn find<'t>(table: &'t Table, name: &str) -> Option<(usize, Option<&'t str>)> {
     if let Some(at) = table.columns.iter().position(|c| c.text == name) {
         return Some((at, None));
     }
-    table.columns.iter().enumerate().find_map(|(at, column)| {
+    let columns = || table.columns.iter().enumerate();
+    let ending = columns().find_map(|(at, column)| {
         let unit = column.text.strip_prefix(name)?.strip_prefix('_')?;
-        parse(unit).is_ok().then_some((at, Some(unit)))
-    })
+        naming::is_unit(unit).then_some((at, Some(unit)))
+    });
+    let named = || {
+        let fits = |(_, c): &(usize, &ColumnName)| c.unit.is_some() && c.name == name;
+        columns().find(fits).map(|(at, c)| (at, c.unit.as_deref()))
+    };
+    let alike = || {
+        let wanted = naming::plain(name);
+        let fits = |(_, c): &(usize, &ColumnName)| naming::plain(&c.name) == wanted;
+        let mut found = columns().filter(fits);
+        let (at, column) = found.next()?;
+        found
+            .next()
+            .is_none()
+            .then_some((at, column.unit.as_deref()))
+    };
+    ending.or_else(named).or_else(alike)
+}
+
+/// No column is what something needs; the nearest is named by names, and shown by its header.
+pub(crate) fn missing(
+    table: &Table,
+    role: &'static str,
+    id: &str,
+    wanted: String,
+    like: &str,
+) -> RecordingError {
+    let columns = &table.columns;
+    let texts = columns.iter().map(|c| c.text.as_str());
+    let by_name = nearest(like, columns.iter().map(|c| c.name.as_str()))
+        .and_then(|name| columns.iter().find(|c| c.name == *name))
+        .map(|c| c.text.as_str().into());
+    RecordingError::MissingColumn {
+        log: table.source.as_str().into(),
+        role,
+        id: id.into(),
+        wanted: wanted.into(),
+        nearest: by_name.or_else(|| nearest(like, texts)),
+        columns: table.column_texts().into(),
+    }
 }
 
 struct Finder<'t> {
@@ -156,23 +215,6 @@ struct Finder<'t> {
 }
 
 impl Finder<'_> {
-    fn missing(&self, role: &'static str, id: &str, wanted: String, like: &str) -> RecordingError {
-        // Compare with names, show headers.
-        let columns = &self.table.columns;
-        let texts = columns.iter().map(|c| c.text.as_str());
-        let by_name = nearest(like, columns.iter().map(|c| c.name.as_str()))
-            .and_then(|name| columns.iter().find(|c| c.name == *name))
-            .map(|c| c.text.as_str().into());
-        RecordingError::MissingColumn {
-            log: self.table.source.as_str().into(),
-            role,
-            id: id.into(),
-            wanted: wanted.into(),
-            nearest: by_name.or_else(|| nearest(like, texts)),
-            columns: self.table.column_texts().into(),
-        }
-    }
-
     fn signal(
         &mut self,
         role: &'static str,
@@ -185,7 +227,7 @@ impl Finder<'_> {
                 Some(name) => format!("the model's [log] says `{name}`"),
                 None => format!("expected `{}`", crate::header(signal)),
             };
-            self.missing(role, signal.id, wanted, name)
+            missing(self.table, role, signal.id, wanted, name)
         })?;
         let header = self.table.columns.get(column);
         // A header that is the id itself has no unit to it; one named in the model file may.
@@ -193,20 +235,24 @@ impl Finder<'_> {
             .filter(|h| h.text != signal.id)
             .and_then(|h| h.unit.as_deref());
         let unit = wish.unit.or(ending).or(split);
-        self.link(
+        let link = self.link(
             column,
             signal.id,
             signal.unit,
             unit,
             (wish.scale.unwrap_or(1.0), wish.scale_unit),
-        )
+        )?;
+        Ok(Link {
+            offset: link.offset + wish.offset,
+            ..link
+        })
     }
 
     fn time(&mut self, map: &LogMap) -> Result<Link, RecordingError> {
         let wanted = "a column such as `time_s`, or `period_s` in the model's [log]".to_owned();
         if let Some(time) = &map.time {
             let (column, ending) = find(self.table, time.name())
-                .ok_or_else(|| self.missing("the time", "time", wanted, time.name()))?;
+                .ok_or_else(|| missing(self.table, "the time", "time", wanted, time.name()))?;
             let split = self
                 .table
                 .columns
@@ -221,7 +267,10 @@ impl Finder<'_> {
             );
         }
         let columns = &self.table.columns;
-        let is_time = |name: &str| name.starts_with("time") || name == "t";
+        let is_time = |name: &str| {
+            let name = naming::plain(name);
+            name.starts_with("time") || name == "t"
+        };
         let second = parse("s").ok().map(|s| s.dimension);
         let in_seconds = |unit: &str| parse(unit).ok().map(|u| u.dimension) == second;
         let with_unit = columns
@@ -233,7 +282,8 @@ impl Finder<'_> {
                     .iter()
                     .position(|c| is_time(&c.text) && c.unit.is_none())
             })
-            .ok_or_else(|| self.missing("the time", "time", wanted, "time_s"))?;
+            .or(self.table.stamps)
+            .ok_or_else(|| missing(self.table, "the time", "time", wanted, "time_s"))?;
         let unit = columns.get(column).and_then(|c| c.unit.as_deref());
         self.link(column, "time", "s", unit, (1.0, None))
     }
@@ -258,15 +308,31 @@ impl Finder<'_> {
             });
         }
         if let Some(words) = self.table.labels.get(&column) {
-            let first = self.table.runs.first().cloned().unwrap_or_default();
-            return Err(RecordingError::TextColumn {
-                log: self.table.source.as_str().into(),
-                at: Box::new(self.table.location(&first, 0, column)),
-                id: id.into(),
-                text: words.first().cloned().unwrap_or_default().into(),
-            });
+            return Err(self.table.text_column(column, id, words));
         }
         let expected = self.unit(id, si)?;
+        let kelvin = self.unit(id, "K")?.dimension;
+        let scale_of = |text| naming::temperature(text, expected.dimension == kelvin);
+        if let Some((degree, zero)) = unit.and_then(scale_of)
+            && scale_unit.is_none()
+        {
+            if expected.dimension != kelvin {
+                return Err(RecordingError::UnitMismatch {
+                    log: self.table.source.as_str().into(),
+                    column: header.as_str().into(),
+                    unit: unit.unwrap_or_default().into(),
+                    found: kelvin,
+                    id: id.into(),
+                    expected_unit: si.into(),
+                    expected: expected.dimension,
+                });
+            }
+            return Ok(Link {
+                column,
+                factor: degree * scale / expected.factor,
+                offset: zero * scale / expected.factor,
+            });
+        }
         // What a transducer has a gain for is a plain number where the column does not say more.
         let given = unit.or(scale_unit.map(|_| "1"));
         let factor = match given {
@@ -304,6 +370,7 @@ impl Finder<'_> {
         Ok(Link {
             column,
             factor: factor * scale,
+            offset: 0.0,
         })
     }
 

@@ -9,6 +9,7 @@ use loopsight_model::log_map::{ColumnMap, LogMap};
 
 use crate::channels;
 use crate::csv_read::parse_csv;
+use crate::derive;
 use crate::error::RecordingError;
 use crate::sysid::{SysIdLog, read_sysid};
 use crate::table::{TIME, Table};
@@ -49,11 +50,23 @@ impl Source {
             }
             _ => (self.table(), Cow::Borrowed(map)),
         };
+        if map.period_s.is_some() && self.says_both(&map) {
+            return Err(RecordingError::TimeTwice);
+        }
+        for sum in derive::wanted(&table, &map) {
+            table.to_mut().add_sum(sum)?;
+        }
         if let (Some(period), None) = (map.period_s, &map.time) {
             table.to_mut().stamp(period)?;
             map.to_mut().time = Some(ColumnMap::Name(TIME.to_owned()));
         }
         Ok((table, map))
+    }
+
+    /// Whether a model file names a column of time stamps beside a period.
+    fn says_both(&self, map: &LogMap) -> bool {
+        let own = map.time.as_ref().is_some_and(|time| time.name() == TIME);
+        map.time.is_some() && !(own && matches!(self, Source::Channels(_)))
     }
 
     /// A model file for a log that describes itself.

@@ -16,7 +16,8 @@
 use loopsight_core::unit::{Unit, parse};
 use serde_json::{Map, Value};
 
-use crate::error::{RecordingError, nearest};
+use crate::error::RecordingError;
+use crate::names::nearest;
 
 mod broken;
 mod view;

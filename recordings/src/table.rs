@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::unit::split_name;
-
 use crate::error::{Location, RecordingError};
+use crate::naming;
 
 /// Name of a column of time stamps that a file does not have.
 pub(crate) const TIME: &str = "time_s";
@@ -24,6 +23,9 @@ pub struct Table {
     pub own_clocks: bool,
     /// Where and how the file ends too early; empty: it does not.
     pub cut: String,
+    /// The column of time stamps where its name does not say it: dates and times, in seconds since the first
+    /// of them, or the first column of a file without a header, where it rises throughout.
+    pub stamps: Option<usize>,
 }
 
 /// Header of one column.
@@ -53,11 +55,11 @@ pub struct TableRun {
 impl ColumnName {
     /// Splits a header.
     pub fn new(text: &str) -> Self {
-        let (name, unit) = split_name(text);
+        let (name, unit) = naming::split(text);
         Self {
             text: text.to_owned(),
             name: name.to_owned(),
-            unit: unit.map(str::to_owned),
+            unit,
         }
     }
 }
@@ -99,12 +101,24 @@ impl Table {
         self.columns.insert(0, ColumnName::new(TIME));
         let labels = std::mem::take(&mut self.labels);
         self.labels = labels.into_iter().map(|(at, w)| (at + 1, w)).collect();
+        self.stamps = self.stamps.map(|at| at + 1);
         Ok(())
     }
 
     /// Rows of a run as slices.
     pub(crate) fn rows<'t>(&self, run: &'t TableRun) -> std::slice::ChunksExact<'t, f64> {
         run.rows.chunks_exact(self.columns.len().max(1))
+    }
+
+    /// A column of words where `id` needs numbers.
+    pub(crate) fn text_column(&self, column: usize, id: &str, words: &[String]) -> RecordingError {
+        let first = self.runs.first().cloned().unwrap_or_default();
+        RecordingError::TextColumn {
+            log: self.source.as_str().into(),
+            at: Box::new(self.location(&first, 0, column)),
+            id: id.into(),
+            text: words.first().cloned().unwrap_or_default().into(),
+        }
     }
 
     /// Place of a value; `row` and `column` from 0.

@@ -74,6 +74,7 @@ fn named(name: &str, unit: Option<&str>) -> ColumnMap {
         unit: unit.map(str::to_owned),
         scale: 1.0,
         scale_unit: None,
+        offset: 0.0,
         hold: Hold::ZeroOrder,
     })
 }

@@ -103,7 +103,13 @@ fn every_answer_keeps_its_contract() {
     for (arguments, status, ways) in [
         (&["list"][..], 0, plain),
         (&["inspect", "log.csv"], 0, plain),
+        (
+            &["convert", "model.toml", "log.csv", "-o", "si.csv"],
+            0,
+            plain,
+        ),
         (&["explain", "ddmr"], 0, plain),
+        (&["explain", "log"], 0, plain),
         (&["explain", "coulomb_friction"], 0, plain),
         (&["explain", "expression"], 0, plain),
         (

@@ -21,7 +21,7 @@ pub struct ExplainAnswer {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Explained {
-    /// `plant`, `effect`, `estimator`, `controller` or `driver`.
+    /// `plant`, `effect`, `estimator`, `controller` or `driver`; `table`: a table of model files.
     pub role: &'static str,
     /// Identifier in TOML.
     pub id: &'static str,
@@ -62,7 +62,7 @@ pub struct Explained {
     /// Plants that an effect attaches to.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub attaches_to: Vec<ExplainedHome>,
-    /// Settings of an estimator, a controller or a driver.
+    /// Settings of an estimator, a controller or a driver, keys of a table.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub settings: Vec<ExplainedSignal>,
     /// Where the equations come from.

@@ -9,6 +9,7 @@ mod add;
 mod check;
 mod common;
 mod compare;
+mod convert;
 mod diagnose;
 mod experiment;
 mod explain;
@@ -33,6 +34,7 @@ pub use common::{
     Recommendation, SignalError,
 };
 pub use compare::CompareAnswer;
+pub use convert::ConvertAnswer;
 pub use diagnose::{Candidate, DiagnoseAnswer};
 pub use experiment::{ConsideredExperiment, ExperimentAnswer};
 pub use explain::{

@@ -26,9 +26,11 @@ pub(crate) enum Command {
     Check(CheckArguments),
     /// Say what is in a log of any program, and write a model file for it.
     Inspect(InspectArguments),
+    /// Write the signals that a model has in a log, in SI units, as CSV or MCAP.
+    Convert(ConvertArguments),
     /// List the known plants, effects, estimators, controllers and drivers.
     List(ListArguments),
-    /// Explain one of them: equation, parameters, channels, reference, example.
+    /// Explain one of them, or a table of a model file: equation, parameters, example.
     Explain(ExplainArguments),
     /// Drive a simulated robot with an experiment and write its log.
     Simulate(SimulateArguments),
@@ -111,6 +113,20 @@ pub(crate) struct InspectArguments {
 }
 
 #[derive(Debug, Args)]
+#[command(override_usage = "loopsight convert [OPTIONS] [MODEL] <LOG> --output <FILE>")]
+pub(crate) struct ConvertArguments {
+    /// Model file and log; without a model file the channels are taken for what `inspect` takes them for.
+    #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// The file to write: MCAP where its name ends in `.mcap`, CSV where it ends in `.csv`.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct ListArguments {
     /// Only these: plants, effects, estimators, controllers or drivers.
     #[arg(value_enum)]
@@ -131,7 +147,8 @@ pub(crate) enum RoleName {
 
 #[derive(Debug, Args)]
 pub(crate) struct ExplainArguments {
-    /// Id of a plant, an effect, an estimator, a controller or a driver.
+    /// Id of a plant, an effect, an estimator, a controller or a driver; `log`, `fit` or `simulation`: the table of
+    /// a model file.
     pub(crate) id: String,
     /// JSON on standard output.
     #[arg(long)]

@@ -8,7 +8,11 @@ use crate::error::Error;
 pub(crate) fn print(error: &Error) {
     let text = placed(error).unwrap_or_else(|| {
         let help = error.help();
-        let help = help.map_or_else(String::new, |help| format!(" ({help})"));
+        let help = help.map_or_else(String::new, |help| match help.contains('\n') {
+            // What can be pasted stands on lines of its own.
+            true => format!("\n{help}"),
+            false => format!(" ({help})"),
+        });
         format!("error: {}{help}", error.message())
     });
     eprintln!("{}", text.trim_end());

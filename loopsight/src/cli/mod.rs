@@ -60,6 +60,7 @@ fn execute(arguments: &Arguments) -> Result<()> {
         Command::New(options) => commands::new::run(options),
         Command::Check(options) => commands::check::run(options),
         Command::Inspect(options) => commands::inspect::run(options),
+        Command::Convert(options) => commands::convert::run(options),
         Command::List(options) => commands::list::run(options),
         Command::Explain(options) => commands::explain::run(options),
         Command::Simulate(options) => commands::simulate::run(options),

@@ -163,7 +163,7 @@ fn mapped(signal: &Signal, channel: &ChannelFacts) -> MappedChannel {
 }
 
 /// The channel that is most likely a signal, with its score.
-fn best<'i>(
+pub(super) fn best<'i>(
     signal: &Signal,
     input: bool,
     inventory: &'i Inventory,

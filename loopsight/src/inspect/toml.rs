@@ -7,7 +7,7 @@ use loopsight_recordings::Inventory;
 use crate::answers::{FittingPlant, MappedChannel};
 
 /// Period that stands in a file where nobody knows it, s.
-const GUESSED_PERIOD: f64 = 0.01;
+pub(super) const GUESSED_PERIOD: f64 = 0.01;
 
 /// What stamps the rows.
 #[derive(Clone, Copy)]

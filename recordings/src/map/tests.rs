@@ -43,6 +43,7 @@ fn column(name: &str, unit: Option<&str>, scale: f64) -> ColumnMap {
         unit: unit.map(str::to_owned),
         scale,
         scale_unit: None,
+        offset: 0.0,
         hold: Hold::ZeroOrder,
     })
 }
@@ -78,6 +79,7 @@ fn the_model_file_names_columns_units_and_scales() {
                 ..Measured::default()
             },
         )]),
+        ..LogMap::default()
     };
     let recording = mapped(text, &log_map).unwrap();
     assert_eq!(

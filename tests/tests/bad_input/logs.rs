@@ -67,7 +67,13 @@ fn spoilt_logs() {
         (String::new(), &["empty"]),
         ("\n\n".to_owned(), &["empty"]),
         (format!("{header}\n"), &["no row"]),
-        (log.replacen(&format!("{header}\n"), "", 1), &["no header"]),
+        (
+            log.replacen(&format!("{header}\n"), "", 1),
+            &[
+                "no column for the input `voltage_right`",
+                "column = \"column 2\"",
+            ],
+        ),
         (model_text(), &["spoilt.csv"]),
         (
             "{\"sysid\": true, \"test\": ".to_owned(),

@@ -15,7 +15,7 @@ use loopsight_core::Parameter;
 use loopsight_model::config::TomlSource;
 use loopsight_model::excitation::{Between, Excitation};
 use loopsight_model::identification::LearningSettings;
-use loopsight_model::log_map::{Column, ColumnMap, Hold, LogMap, Measured};
+use loopsight_model::log_map::{Column, ColumnMap, Hold, LogMap, Measured, Ranges};
 use loopsight_model::loop_file::LoopFile;
 use loopsight_model::model::{FitOptions, Model, ModelFile, SimulationOptions, misfit};
 use loopsight_model::registry::{
@@ -299,29 +299,38 @@ fn column() -> impl Strategy<Value = ColumnMap> {
             option::of(name()),
             finite(),
             option::of(name()),
+            finite(),
             select(vec![Hold::ZeroOrder, Hold::FirstOrder]),
         )
-            .prop_map(|(column, unit, scale, scale_unit, hold)| {
+            .prop_map(|(column, unit, scale, scale_unit, offset, hold)| {
                 ColumnMap::Full(Column {
                     column,
                     unit,
                     scale,
                     scale_unit,
+                    offset,
                     hold,
                 })
             }),
     ]
 }
 
+fn ranges() -> impl Strategy<Value = Ranges> {
+    let part = (finite(), finite()).prop_map(|(a, b)| (a.min(b), a.max(b)));
+    vec(part, 0..3).prop_map(Ranges::of)
+}
+
 fn measured() -> impl Strategy<Value = Measured> {
     let scale = option::of(finite());
     let unit = || option::of(name());
-    (option::of(name()), unit(), scale, unit(), sensor()).prop_map(
-        |(column, unit, scale, scale_unit, sensor)| Measured {
+    let offset = option::of(finite());
+    (option::of(name()), unit(), scale, unit(), offset, sensor()).prop_map(
+        |(column, unit, scale, scale_unit, offset, sensor)| Measured {
             column,
             unit,
             scale,
             scale_unit,
+            offset,
             sensor,
         },
     )
@@ -342,6 +351,7 @@ proptest! {
         period_s in option::of(finite()),
         run in option::of(name()),
         inputs_measured in any::<bool>(),
+        parts in (ranges(), ranges()),
         inputs in btree_map(name(), column(), 0..3),
         measured in btree_map(name(), measured(), 0..3),
         max_step_s in option::of(finite()),
@@ -349,7 +359,16 @@ proptest! {
         fixed in vec(name(), 0..3),
     ) {
         same(&Tables {
-            log: LogMap { time, period_s, run, inputs_measured, inputs, measured },
+            log: LogMap {
+                time,
+                period_s,
+                run,
+                inputs_measured,
+                rows: parts.0,
+                times_s: parts.1,
+                inputs,
+                measured,
+            },
             simulation: SimulationOptions { max_step_s },
             fit: FitOptions {
                 free,

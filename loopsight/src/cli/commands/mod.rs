@@ -5,6 +5,7 @@ pub(crate) mod bringup;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod completions;
+pub(crate) mod convert;
 mod dashboard;
 pub(crate) mod diagnose;
 pub(crate) mod experiment;

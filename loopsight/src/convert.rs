@@ -1,0 +1,124 @@
+//! A log as its model sees it, for other programs.
+
+use std::path::Path;
+
+use loopsight_recordings::{LogWriter, header, write_csv};
+
+use crate::answers::{Answer, ConvertAnswer};
+use crate::error::{Error, Result};
+use crate::session::Session;
+use crate::{files, words};
+
+/// Between runs that are laid end to end, s.
+const PAUSE: f64 = 1.0;
+
+impl Session {
+    /// Writes the signals that the model has in the log, in SI units: CSV, or MCAP where the name ends in
+    /// `.mcap`. Several runs have a column `run` with their numbers. In CSV the time of each begins at 0; in MCAP,
+    /// which players show on one line of time, they stand one after the other, 1 s apart. What was not measured at
+    /// a time stamp is left empty.
+    ///
+    /// # Errors
+    ///
+    /// The session has no log, or the file cannot be written.
+    pub fn convert(&self, path: impl AsRef<Path>) -> Result<ConvertAnswer> {
+        let path = path.as_ref();
+        let data = self.data()?;
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        let mcap = match ending.as_deref() {
+            Some("mcap") => true,
+            Some("csv") => false,
+            _ => {
+                return Err(Error::request(format!(
+                    "cannot write `{}`: expected a name that ends in .csv or .mcap",
+                    path.display()
+                )));
+            }
+        };
+        files::writable(path)?;
+        let several = data.runs.len() > 1;
+        let mut columns = vec!["time_s".to_owned()];
+        columns.extend(several.then(|| "run".to_owned()));
+        columns.extend(data.model.plant.inputs.iter().map(header));
+        columns.extend(data.model.measured.iter().map(|m| header(m.signal)));
+        let mut rows: Vec<f64> = Vec::new();
+        let mut begin = 0.0;
+        for (number, run) in (1_u32..).zip(data.runs.iter()) {
+            for k in 0..run.len() {
+                rows.push(run.time()[k] + if mcap { begin } else { 0.0 });
+                rows.extend(several.then(|| f64::from(number)));
+                rows.extend(run.input(k).iter().chain(run.sample(k)));
+            }
+            begin += run.duration() + PAUSE;
+        }
+        let wrong = |error| Error::in_log(&error, &path.display().to_string(), None);
+        if mcap {
+            let mut log = LogWriter::create(path, &columns).map_err(wrong)?;
+            for row in rows.chunks_exact(columns.len()) {
+                log.write(row).map_err(wrong)?;
+            }
+            log.finish().map_err(wrong)?;
+        } else {
+            write_csv(path, &columns, &rows).map_err(wrong)?;
+        }
+        let samples = rows.len() / columns.len();
+        let duration_s = data.runs.iter().map(|run| run.duration()).sum();
+        Ok(ConvertAnswer {
+            schema: ConvertAnswer::SCHEMA,
+            summary: format!(
+                "{} of {}: {} runs, {samples} samples over {} s, columns {}.",
+                path.display(),
+                data.log,
+                data.runs.len(),
+                words::number(duration_s),
+                columns.join(", ")
+            ),
+            file: path.display().to_string(),
+            runs: data.runs.iter().map(|run| run.name().to_owned()).collect(),
+            samples,
+            duration_s,
+            columns,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Log, Model, Session};
+
+    /// The signals that a model has in a log, in SI, read back by their names.
+    #[test]
+    fn what_is_written_reads_back_to_the_same_runs() {
+        let folder = tempfile::tempdir().unwrap();
+        let row = |k: u32| format!("{},{},{},{}\n", 20 * (k % 100), k / 100, k % 7, 3 * k);
+        let rows: String = (0..200).map(row).collect();
+        let text = format!("t_ms,run,u,w_rpm\n{rows}");
+        let plant = "[plant.dc_axis]\n";
+        let map = "[log]\ntime = \"t_ms\"\n[log.inputs]\nvoltage = { column = \"u\", unit = \"V\" }\n\
+                   [log.measured.speed]\ncolumn = \"w_rpm\"\n";
+        let model = |text: String| Model::from_toml("m.toml", &text).unwrap();
+        let log = Log::from_bytes("log.csv", text.as_bytes()).unwrap();
+        let before = Session::new(model(format!("{plant}{map}")), log).unwrap();
+        for name in ["si.csv", "si.mcap"] {
+            let path = folder.path().join(name);
+            let answer = before.convert(&path).unwrap();
+            assert_eq!(
+                answer.columns,
+                ["time_s", "run", "voltage_V", "speed_rad_per_s"]
+            );
+            let after = Session::new(model(plant.to_owned()), Log::read(&path).unwrap()).unwrap();
+            let (a, b) = (before.data().unwrap(), after.data().unwrap());
+            assert_eq!(a.runs.len(), b.runs.len());
+            for (a, b) in a.runs.iter().zip(b.runs.iter()) {
+                assert_eq!(a.len(), b.len());
+                for k in 0..a.len() {
+                    assert!((a.time()[k] - b.time()[k]).abs() < 1e-9, "{name}");
+                    assert_eq!(a.input(k), b.input(k), "{name}");
+                    assert!((a.sample(k)[0] - b.sample(k)[0]).abs() < 1e-12, "{name}");
+                }
+            }
+        }
+        let error = before.convert(folder.path().join("si.xls")).unwrap_err();
+        assert!(error.message().contains("ends in .csv or .mcap"), "{error}");
+    }
+}

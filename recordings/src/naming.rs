@@ -1,0 +1,130 @@
+//! Units at the end of a name: `speed_rpm`, `speed [rpm]`, `Speed (RPM)`, `room_degC`.
+
+use loopsight_core::unit::{parse, split_name};
+
+/// Kelvin of a degree, and kelvin at zero.
+const CELSIUS: (f64, f64) = (1.0, 273.15);
+const FAHRENHEIT: (f64, f64) = (5.0 / 9.0, 459.67 * 5.0 / 9.0);
+
+/// Words that mean a temperature whatever they stand for.
+const TEMPERATURES: [(&str, (f64, f64)); 12] = [
+    ("°C", CELSIUS),
+    ("℃", CELSIUS),
+    ("degC", CELSIUS),
+    ("deg_C", CELSIUS),
+    ("deg C", CELSIUS),
+    ("celsius", CELSIUS),
+    ("°F", FAHRENHEIT),
+    ("℉", FAHRENHEIT),
+    ("degF", FAHRENHEIT),
+    ("deg_F", FAHRENHEIT),
+    ("deg F", FAHRENHEIT),
+    ("fahrenheit", FAHRENHEIT),
+];
+
+/// Factor and offset to kelvin of a scale of temperatures; `C` and `F` are one where a temperature is expected.
+pub(crate) fn temperature(unit: &str, expected: bool) -> Option<(f64, f64)> {
+    match unit {
+        "C" if expected => return Some(CELSIUS),
+        "F" if expected => return Some(FAHRENHEIT),
+        _ => {}
+    }
+    let found = TEMPERATURES
+        .iter()
+        .find(|(word, _)| word.eq_ignore_ascii_case(unit));
+    found.map(|(_, scale)| *scale)
+}
+
+/// Whether a text is a unit, of temperatures as well.
+pub(crate) fn is_unit(text: &str) -> bool {
+    temperature(text, false).is_some() || parse(text).is_ok()
+}
+
+/// The name and the unit of a header.
+pub(crate) fn split(text: &str) -> (&str, Option<String>) {
+    if let Some((name, unit)) = brackets(text) {
+        return (name, Some(unit));
+    }
+    if let (name, Some(unit)) = split_name(text) {
+        return (name, Some(unit.to_owned()));
+    }
+    for (word, _) in TEMPERATURES {
+        let at = text.len().saturating_sub(word.len());
+        let is_end = text
+            .get(at..)
+            .is_some_and(|end| end.eq_ignore_ascii_case(word));
+        let name = text
+            .get(..at)
+            .and_then(|name| name.strip_suffix(['_', ' ']));
+        if let Some(name) = name.filter(|name| is_end && !name.is_empty()) {
+            return (name, Some(word.to_owned()));
+        }
+    }
+    (text, None)
+}
+
+/// `Speed (RPM)`: the name, and the unit in brackets, in small letters where it is none otherwise.
+pub(crate) fn brackets(text: &str) -> Option<(&str, String)> {
+    for (open, close) in [('(', ')'), ('[', ']')] {
+        let inside = text.strip_suffix(close).and_then(|t| t.rsplit_once(open));
+        let Some((name, unit)) = inside else { continue };
+        let (name, unit) = (name.trim_end().trim_end_matches('_'), unit.trim());
+        let lower = unit.to_lowercase();
+        // An index is no unit.
+        let fits =
+            |u: &&str| u.contains(|c: char| c.is_alphabetic() || "%°℃℉".contains(c)) && is_unit(u);
+        if let Some(unit) = [unit, lower.as_str()].into_iter().find(fits)
+            && !name.is_empty()
+        {
+            return Some((name, unit.to_owned()));
+        }
+    }
+    None
+}
+
+/// A name as ids are written: small letters, words joined by `_`.
+pub(crate) fn plain(name: &str) -> String {
+    let mut out = String::with_capacity(name.len());
+    for c in name.chars() {
+        match c {
+            ' ' | '-' => out.push('_'),
+            c => out.extend(c.to_lowercase()),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_behind_a_line_or_in_brackets() {
+        for (text, name, unit) in [
+            ("speed_rpm", "speed", Some("rpm")),
+            ("speed [rpm]", "speed", Some("rpm")),
+            ("Left Speed (M/s)", "Left Speed", Some("m/s")),
+            ("u(V)", "u", Some("V")),
+            ("duty [%]", "duty", Some("%")),
+            ("room_degC", "room", Some("degC")),
+            ("room [°F]", "room", Some("°F")),
+            ("Room Celsius", "Room", Some("celsius")),
+            ("weights[1]", "weights[1]", None),
+            ("omega", "omega", None),
+            ("(V)", "(V)", None),
+        ] {
+            assert_eq!(split(text), (name, unit.map(str::to_owned)), "{text}");
+        }
+    }
+
+    #[test]
+    fn scales_of_temperatures() {
+        let kelvin = |unit, value: f64| {
+            let (factor, offset) = temperature(unit, true).unwrap();
+            value * factor + offset
+        };
+        assert_eq!(kelvin("°C", 20.0), 293.15);
+        assert!((kelvin("F", 68.0) - 293.15).abs() < 1e-9);
+        assert_eq!(temperature("C", false), None);
+    }
+}
