@@ -60,6 +60,8 @@ const STALE: f64 = 5.0;
 const LOST: f64 = 0.5;
 /// Periods of what takes a window of half a second or a second at 100 Hz.
 const WINDOW: f64 = 50.0;
+/// Periods for which a speed that does not change is no dead encoder yet: 0.3 s at 100 Hz.
+const FROZEN: f64 = 30.0;
 /// Times its largest reference by which a signal is off only where it goes the wrong way.
 const WRONG_WAY: f64 = 2.0;
 
@@ -72,7 +74,7 @@ impl SupervisorSettings {
             window_s: this.window_s.max(WINDOW * period),
             innovation_s: this.innovation_s.max(2.0 * WINDOW * period),
             tracking_s: this.tracking_s.max(2.0 * WINDOW * period),
-            frozen_s: this.frozen_s.max(WINDOW * period),
+            frozen_s: this.frozen_s.max(FROZEN * period),
             stale_s: this.stale_s.max(STALE * period),
             calm_s: this.calm_s.max(2.0 * WINDOW * period),
             ..this
