@@ -78,8 +78,8 @@
 mod about;
 mod add;
 pub mod answers;
-#[cfg(feature = "cli")]
 mod bounded;
+#[cfg(feature = "cli")]
 mod bringup;
 mod check;
 #[cfg(feature = "cli")]

@@ -3,8 +3,10 @@
 use loopsight_diagnosis::tracking::StepResponse;
 use loopsight_diagnosis::{Comparison, Diagnosis, Fit, Improvement, Plan};
 pub(crate) use loopsight_report::words as report;
+#[cfg(feature = "cli")]
+pub(crate) use report::hundredths as percent;
 use report::run::{Learned, Regression, RunFigures, Tracked};
-pub(crate) use report::{faults, hundredths as percent, number};
+pub(crate) use report::{faults, number};
 
 use crate::answers::{ReferenceStep, RunAnswer, Tracking};
 
