@@ -33,10 +33,13 @@ pub fn composed(text: &str, model: &Model, robot: &str) -> Result<Composed, Box<
     )
 }
 
-/// A velocity loop of [`PERIOD`] with 12 V, and with `rest`, around `model`; as [`composed`].
+/// A velocity loop of [`PERIOD`] with 12 V, and with `rest`, around `model`; as [`composed`]. Nobody watches where
+/// `rest` has no `[supervisor]`.
 pub fn velocity_loop(rest: &str, model: &Model, robot: &str) -> Composed {
+    let watched = rest.contains("[supervisor]");
+    let nobody = if watched { "" } else { "supervisor = false\n" };
     let text = format!(
-        "model = \"model.toml\"\nperiod_s = {PERIOD}\n\
+        "model = \"model.toml\"\nperiod_s = {PERIOD}\n{nobody}\
          [controller.feedback_linearizing_pi]\nsettling_time_s = 0.45\nlimit = 12.0\n{rest}\n"
     );
     composed(&text, model, robot).unwrap()

@@ -39,10 +39,20 @@ impl Improved {
         *self.unseen.last().unwrap()
     }
 
+    /// Level of the friction, V: the mean over the wheels where each has its own.
+    fn friction(&self) -> f64 {
+        let parameters = &self.best.as_ref().unwrap().parameters;
+        let levels = parameters
+            .iter()
+            .filter(|p| p.name.starts_with("coulomb_friction") && p.name.ends_with(".level"));
+        let levels: Vec<f64> = levels.filter_map(|p| p.value).collect();
+        levels.iter().sum::<f64>() / levels.len() as f64
+    }
+
     /// Dry friction was found first, and is this strong in the end, V.
     fn begins_with_friction(&self, volts: Range<f64>) {
         assert_eq!(self.added[0], "coulomb_friction", "{:?}", self.added);
-        let level = self.value("coulomb_friction.level");
+        let level = self.friction();
         assert!(volts.contains(&level), "{level} V");
     }
 

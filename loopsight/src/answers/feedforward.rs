@@ -67,13 +67,12 @@ impl Feedforward {
         let k_a = per("kA", &format!("V s^2/{units}"))?;
         let volts = |effects: &[&str]| {
             let named = |name: &str| {
-                let mut parts = name.split('.');
-                let (effect, parameter) = (parts.next(), parts.next());
-                effect.is_some_and(|e| effects.contains(&e)) && parameter == Some("level")
+                let effect = name.split(['.', '@']).next();
+                effect.is_some_and(|e| effects.contains(&e)) && name.ends_with(".level")
             };
-            let mut found = fit.parameters.iter();
-            let (_, estimate) = found.find(|(name, p)| named(name) && p.unit == "V")?;
-            Some(ParameterEstimate::from(estimate))
+            let found = fit.parameters.iter();
+            let found = found.filter(|(name, p)| named(name) && p.unit == "V");
+            mean(found.map(|(_, p)| ParameterEstimate::from(p)).collect())
         };
         let feedback = Feedback::of(k_v.value, k_a.value)?;
         Some(Self {
@@ -115,6 +114,25 @@ impl Feedforward {
         } = self.feedback;
         feedforward::summary(&terms, [velocity_kp, position_kp, position_kd])
     }
+}
+
+/// The mean of what each channel has of its own; its error that of channels that err together. None of nothing.
+fn mean(of: Vec<ParameterEstimate>) -> Option<ParameterEstimate> {
+    let n = of.len() as f64;
+    of.into_iter()
+        .map(|mut one| {
+            one.value /= n;
+            one.std_error = one.std_error.map(|e| e / n);
+            one.interval95 = one.interval95.map(|ends| ends.map(|end| end / n));
+            one
+        })
+        .reduce(|mut sum, one| {
+            sum.value += one.value;
+            sum.std_error = sum.std_error.zip(one.std_error).map(|(a, b)| a + b);
+            sum.interval95 =
+                (sum.interval95.zip(one.interval95)).map(|(a, b)| [a[0] + b[0], a[1] + b[1]]);
+            sum
+        })
 }
 
 fn scaled(estimate: &Estimate, size: f64, unit: &str) -> ParameterEstimate {
