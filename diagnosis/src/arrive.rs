@@ -1,4 +1,4 @@
-//! A fit that arrives: from several starts, and a verdict on where it came to.
+//! A fit from several starting points, and whether it converged.
 
 use serde::Serialize;
 
@@ -16,26 +16,26 @@ use crate::solve::Effort;
 const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
 /// Scattered starts.
 const SCATTERED: usize = 8;
-/// Scattered starts reach so many decades to either side of a value without a range.
+/// Where a parameter has no range, scattered starts reach this many decades above and below its value.
 const DECADES: f64 = 1.5;
-/// Other starts that are tried, the best first.
+/// Most other starts that are tried, the best first.
 const OTHERS: usize = 6;
-/// Effort of a start that is tried beside the first.
+/// Effort spent on each start but the first.
 const SHORT: Effort = Effort {
     iterations: 12,
     tolerance: 1e-4,
 };
 
-/// Where a fit began, and what it left.
+/// Where a fit began, and the error it ended with.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Tried {
     /// What the start was made of.
     pub from: String,
-    /// Free-run error relative to the standard deviation where it ended.
+    /// Free-run error at its end, relative to the standard deviation.
     pub nrmse: f64,
 }
 
-/// Whether a fit arrived.
+/// Whether a fit converged.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Convergence {
     /// The error falls no further, and the model leaves less than a constant would.
@@ -43,7 +43,7 @@ pub struct Convergence {
     /// Why not, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// The starts that were tried; the first is the one that promised most.
+    /// The starts that were tried, the most promising first.
     pub starts: Vec<Tried>,
 }
 
@@ -89,9 +89,9 @@ impl Convergence {
 }
 
 impl Problem<'_> {
-    /// Solves from the start that promises most: the file's values, or those of a regression over one of
-    /// several spans. Where that leads to a poor place others are tried, scattered ones among them where
-    /// it is hopeless; the one that led furthest is followed to the end.
+    /// Solves from the most promising start: the file's values, or those of a regression over one of several
+    /// spans. If the error stays large, other starts are tried. If it stays very large, scattered starts are
+    /// among them. The start that led to the least error is solved to the end.
     pub(crate) fn arrive(
         &mut self,
         settings: &FitSettings,
@@ -101,7 +101,7 @@ impl Problem<'_> {
         let mut starts = self.starts(settings)?;
         let mut tried = Vec::new();
         let mut best = None;
-        // The first that can be followed at all.
+        // The first that the solver gets anywhere from.
         while best.is_none() && !starts.is_empty() {
             let start = starts.remove(0);
             best = self.attempt(&start, effort, &mut tried)?;
@@ -144,7 +144,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Follows a start, and notes where it led; none where the solver gives up.
+    /// Solves from one start and records the result; none where the solver gives up.
     fn attempt(
         &mut self,
         start: &Start,
@@ -180,8 +180,8 @@ impl Problem<'_> {
         })
     }
 
-    /// The file's values and those of regressions, whichever runs closest to the data first. Where there
-    /// is neither, the sizes of the declarations.
+    /// The file's values and those of regressions, the one whose free run is closest to the data first. Where
+    /// there is neither, the typical sizes that the declarations give.
     fn starts(&self, settings: &FitSettings) -> Result<Vec<Start>, FitError> {
         let mut starts = Vec::new();
         if self.model.missing_values().is_empty() {
@@ -232,8 +232,8 @@ impl Problem<'_> {
         }))
     }
 
-    /// Starts scattered over the ranges of the parameters, or some decades around `values`, always the
-    /// same; the best of them first.
+    /// Starts scattered over the ranges of the parameters, or some decades around `values`, the best first.
+    /// They are always the same ones.
     fn scattered(&self, values: &[f64]) -> Result<Vec<Start>, FitError> {
         let mut starts = Vec::new();
         for k in 0..SCATTERED {
@@ -251,9 +251,9 @@ impl Problem<'_> {
     }
 }
 
-/// The `k`-th of points that fill the unit cube evenly, in one of its dimensions: multiples of roots of
-/// primes, without their whole part (H. Niederreiter, 1992, "Random Number Generation and Quasi-Monte
-/// Carlo Methods", theorem 4.3).
+/// One coordinate of the `k`-th of points that fill the unit cube evenly: the fractional part of `k` times the
+/// root of a prime (H. Niederreiter, 1992, "Random Number Generation and Quasi-Monte Carlo Methods", theorem
+/// 4.3).
 fn spread(k: usize, dimension: usize) -> f64 {
     const PRIMES: [f64; 12] = [
         2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0,
@@ -262,7 +262,7 @@ fn spread(k: usize, dimension: usize) -> f64 {
     ((k + 1) as f64 * root).fract()
 }
 
-/// The value of a parameter at `share` of where it may be.
+/// The value of a parameter at the fraction `share` of its range.
 fn scatter(parameter: &ModelParameter, value: f64, share: f64) -> f64 {
     let (low, high) = parameter.declaration.bounds();
     if low.is_finite() && high.is_finite() && low < 0.0 {
@@ -276,7 +276,7 @@ fn scatter(parameter: &ModelParameter, value: f64, share: f64) -> f64 {
     } else {
         value
     };
-    // A sign that is not known goes both ways: the halves of the share have one each.
+    // Where the sign is not known, one half of the shares gives negative values and the other positive ones.
     let (sign, share) = if parameter.value.is_none() && low < 0.0 && high > 0.0 {
         let negative = share < 0.5;
         (if negative { -1.0 } else { 1.0 }, (2.0 * share).fract())

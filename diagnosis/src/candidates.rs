@@ -1,4 +1,4 @@
-//! Everything the library could add to a model, and where.
+//! The candidates of a diagnosis: every effect at every channel where it could be added to the model.
 
 use loopsight_core::{Channel, EffectMeta, Parameter, Place, Role};
 use loopsight_model::model::{Attached, Model, misfit};
@@ -16,15 +16,14 @@ pub(crate) struct Candidate {
     pub(crate) at: Vec<&'static str>,
     /// Each channel has parameters of its own; else they share them.
     pub(crate) separate: bool,
-    /// The effect of the nominal model that it replaces, because it contains it: its id, and the indices of
-    /// the parameters that are gone.
+    /// The effect of the nominal model that it replaces, because it contains it: id, and indices of the
+    /// parameters that are removed.
     pub(crate) replaces: Option<(&'static str, std::ops::Range<usize>)>,
     /// The model with it, at neutral parameters.
     pub(crate) model: Model,
     /// Root mean square of the flow at its channels in the recording; 0 where there is none.
     pub(crate) flow: f64,
-    /// It reads a position, and no observer corrects the free runs: it can be tried at the measured
-    /// positions.
+    /// It can be tried at the measured positions: it reads a position, and no observer corrects the free runs.
     pub(crate) by_position: bool,
     /// Widths over which signs of all effects are smoothed at first, by index of the parameter.
     pub(crate) widths: Vec<(usize, f64)>,
@@ -63,8 +62,8 @@ impl Candidate {
             .count()
     }
 
-    /// Its own parameters that do not enter linearly, where the effect reads a position and others do enter
-    /// linearly: at the measured positions a regression finds those others.
+    /// Its own non-linear parameters, where the effect reads a position and has linear parameters as well: at
+    /// the measured positions a regression finds the linear ones.
     pub(crate) fn shape(&self) -> Option<Vec<usize>> {
         let linear = |i: &usize| self.model.parameters[*i].declaration.linear;
         let regressed = self.by_position && self.own().any(|i| linear(&i));
@@ -84,8 +83,8 @@ impl Candidate {
         self.own().filter(is_width).collect()
     }
 
-    /// Whether, at these `values`, one of its speeds is no larger than the width over which its sign is
-    /// smoothed. Such an effect does no more than sharpen the sign.
+    /// Whether, at these `values`, one of its speeds is no larger than the smoothing width of its sign.
+    /// Such an effect only sharpens the sign.
     pub(crate) fn drowns(&self, values: &[f64], criteria: &SearchCriteria) -> bool {
         let speeds = |width: bool| {
             self.own().filter_map(move |i| {
@@ -99,8 +98,8 @@ impl Candidate {
         speeds(false).any(|speed| speed < criteria.clear_of_sign * width)
     }
 
-    /// Its model with every sign smoothed widely, also those of the effects that were there before. A sharp
-    /// sign has no derivative but at zero, where it has a huge one, and a fit cannot find its way.
+    /// Its model with every sign smoothed widely, those of earlier effects included. The derivative of a sharp
+    /// sign is huge at zero and zero elsewhere: it gives a fit no direction.
     pub(crate) fn softened(&self) -> Model {
         let mut model = self.model.clone();
         for (index, width) in &self.widths {
@@ -126,11 +125,12 @@ impl Candidate {
 /// All candidates for `model`: each effect at every single channel it fits, and at all channels of a
 /// family (both wheels, all inputs), alike and each with its own parameters.
 ///
-/// Left out are effects that the model has at these channels already, those that act on a signal which is
-/// not measured, and, where the log's inputs were measured at the machine, those that act before it. An effect that contains one of the model's at the same channels replaces it.
+/// Left out are effects that the model already has at these channels and effects on signals that are not
+/// measured. Where the log's inputs were measured at the machine, effects before that point are left out too.
+/// An effect that contains one of the model's at the same channels replaces it.
 ///
-/// `rms` are the root mean squares of the plant's signals in the recording. Smoothing widths are set from them:
-/// what suits a robot's wheels does not suit a flywheel. `observed` says that an observer corrects the free
+/// `rms` are the root mean squares of the plant's signals in the recording. Smoothing widths are set from
+/// them, because machines move at very different speeds. `observed` says that an observer corrects the free
 /// runs.
 pub(crate) fn candidates(
     model: &Model,
@@ -196,8 +196,8 @@ pub(crate) fn candidates(
     found
 }
 
-/// Gives the last effect of `model` the width that suits the recording, `sign_width` times the flow. Returns the
-/// root mean square of the flow at its channels.
+/// Sets the smoothing width of the last effect of `model` to `sign_width` times the flow in the recording.
+/// Returns the root mean square of the flow at its channels.
 pub(crate) fn suit(model: &mut Model, rms: &[f64], sign_width: f64) -> f64 {
     let flow = model.effects.last().map_or(0.0, |e| flow(model, e, rms));
     smooth(model, 1, sign_width * flow);
@@ -232,7 +232,7 @@ pub(crate) fn is_width(declaration: &Parameter) -> bool {
     declaration.unit == "flow" && !declaration.estimated
 }
 
-/// Gives the last `count` effects of `model` this width, where they have one; says whether they have.
+/// Sets the smoothing width of those of the last `count` effects of `model` that have one; whether any has.
 pub(crate) fn smooth(model: &mut Model, count: usize, width: f64) -> bool {
     let mut has = false;
     for effect in model.effects.iter().rev().take(count) {
@@ -246,8 +246,8 @@ pub(crate) fn smooth(model: &mut Model, count: usize, width: f64) -> bool {
     has
 }
 
-/// Whether an effect at a channel is one that the model has at an equivalent channel, or that is another
-/// candidate there, in the unit of an input.
+/// Whether an effect at a channel is the same as one that the model has at an equivalent channel, or as another
+/// candidate at an equivalent channel in the unit of an input.
 fn has_another_name(model: &Model, meta: &'static EffectMeta, at: &[&str]) -> bool {
     let [id] = at else {
         return false;
@@ -260,7 +260,8 @@ fn has_another_name(model: &Model, meta: &'static EffectMeta, at: &[&str]) -> bo
         let mut effects = model.effects.iter().filter(|e| e.meta.id == meta.id);
         effects.any(|e| e.at.iter().any(|c| c.id == other.id))
     };
-    // Where a part of the plant does not show and is tied, an effort of the whole is one at its inputs.
+    // Where a part of the plant is tied because the log does not show it, an effort on the whole is one at its
+    // inputs.
     let tied = !model.tied_names().is_empty();
     let same = |other: &Channel| {
         let efforts = [channel, other].map(|c| matches!(c.place, Place::Effort(_)));
@@ -315,7 +316,7 @@ fn is_seen(model: &Model, meta: &EffectMeta, channel: &Channel) -> bool {
     };
     model.measured.iter().any(|m| {
         m.index == index
-            // Of an encoder's angle the model knows the present value, and not the past.
+            // The model knows the present angle of an encoder, but not its past.
             || !meta.memory && matches!(&m.sensor, Sensor::EncoderCounts(encoder)
                 if encoder.of.keys().any(|s| model.find_signal(s) == Ok(index)))
     })

@@ -12,8 +12,8 @@ pub(crate) struct Chosen {
 }
 
 /// Puts the simplest explanation first that is not significantly worse than the best one, and lists those that
-/// cannot be told from it. An explanation that has not `earned` its place on unseen data comes first only
-/// where none has earned it.
+/// cannot be told from it. An explanation that is not `earned`, so no better on the validation data, comes first
+/// only where no other one is earned.
 pub(crate) fn choose(
     explanations: &mut Vec<Explanation>,
     finalists: &[Judged],
@@ -30,10 +30,10 @@ pub(crate) fn choose(
     finalists.first()?;
     let squared = |i: usize| nrmse(&finalists[i].rank).powi(2);
     let least = squared(0);
-    // While the best explanation leaves much unexplained, something else is missing, and small differences
-    // between explanations may be due to that.
+    // While the best explanation leaves much unexplained, something else is missing too. It may cause small
+    // differences between explanations.
     let allowed = least + blur * (least - floor * floor).max(0.0);
-    // No worse than another one: statistically, or by so little that it makes no difference in use.
+    // No worse than another one: not significantly, or by too little to matter in use.
     let same = |i: usize, other: usize| {
         let (rank, other) = (&finalists[i].rank, &finalists[other].rank);
         let (error, least) = (nrmse(rank), nrmse(other));
@@ -55,9 +55,9 @@ pub(crate) fn choose(
     let leader = firsts()
         .filter(|i| complexity(*i) == simplest)
         .min_by(|a, b| error(*a).total_cmp(&error(*b)))?;
-    // A common effect comes before a rare one, and both wheels alike before one wheel: what is built alike
-    // fails alike. This holds among those whose errors are the same as the leader's; how far the best
-    // explanation is ahead of all of them does not matter here.
+    // A common effect comes before a rare one, and an effect at both wheels before one at one wheel. This orders
+    // only explanations whose errors are the same as the leader's; how far the best one is ahead of them does
+    // not matter here.
     let alike = (0..finalists.len()).filter(may);
     let chosen = alike
         .filter(|i| complexity(*i) == simplest && same(*i, leader))
@@ -67,7 +67,7 @@ pub(crate) fn choose(
             let key = |i: usize| (rarity(i), channels(i));
             key(*a).cmp(&key(*b)).then(error(*a).total_cmp(&error(*b)))
         })?;
-    // Another effect that does as well as the chosen one on unseen data counts as well.
+    // An effect that does as well as the chosen one on the validation data counts too.
     let unseen = |i: usize| nrmse(&finalists[i].losses);
     let id = |i: usize| finalists[i].candidate.meta.id;
     let as_well = |i: usize| {
@@ -79,7 +79,7 @@ pub(crate) fn choose(
     let class: Vec<EffectAt> = (0..finalists.len())
         .filter(|i| not_worse.contains(i) || as_well(*i))
         .filter(|i| *i != chosen && complexity(*i) <= complexity(chosen))
-        // What does nothing explains nothing, and ties with nobody.
+        // An effect of no size explains nothing, so it is no alternative.
         .filter(|i| does_something(*i) || !does_something(chosen))
         .map(|i| explanations[i].place.clone())
         .collect();

@@ -39,7 +39,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// A comparison of which only the error is known: the work was cancelled before it was made.
+    /// A comparison with nothing but its error: the work was cancelled before the rest was computed.
     pub(crate) fn of_error(nrmse: f64) -> Self {
         Self {
             nrmse,
@@ -83,11 +83,11 @@ pub struct SignalTrace {
     pub one_step: Vec<f64>,
 }
 
-/// Simulates `model` over `runs` from the inputs alone, from initial states that are estimated for
-/// each run, and predicts each sample from the one before.
+/// Simulates `model` over `runs` from the inputs alone, and predicts each sample from the one before. The
+/// initial state of each run is estimated.
 ///
-/// A model that is unstable or integrates cannot be simulated like that. An observer corrects its free run by
-/// the measurements, as slowly as possible, and [`Comparison::observer`] says so.
+/// The free run of a model that is unstable or integrates drifts away. There an observer corrects it by the
+/// measurements, as slowly as possible, and [`Comparison::observer`] describes it.
 ///
 /// # Errors
 ///

@@ -13,14 +13,14 @@ pub(crate) const REPORTED: usize = 12;
 /// What decides among the candidates.
 pub(crate) struct Evidence<'a> {
     pub(crate) nominal: &'a Nominal<'a>,
-    /// Losses of the plain model on what no fit saw.
+    /// Losses of the plain model on the validation data.
     pub(crate) unseen: &'a Losses,
     /// Its error on what it was fitted to.
     pub(crate) nominal_fit: f64,
-    /// The error that noise alone would leave on the judging data, and on the fitted data.
+    /// The error that noise alone would leave on the validation data, and on the fitted data.
     pub(crate) floor: f64,
     pub(crate) floor_fit: f64,
-    /// A quantity of the model predicts what it leaves, on blocks that did not choose it.
+    /// A quantity of the model predicts the residuals, on blocks that it was not chosen by.
     pub(crate) predictable: bool,
     /// Least share of the standard deviation that an explanation must account for.
     pub(crate) least: f64,
@@ -73,7 +73,7 @@ impl Evidence<'_> {
         &self.criteria().missing
     }
 
-    /// Error of the plain model on what no fit saw.
+    /// Error of the plain model on the validation data.
     fn error(&self) -> f64 {
         nrmse(self.unseen)
     }
@@ -82,16 +82,16 @@ impl Evidence<'_> {
         error > self.missing().above_floor * self.floor
     }
 
-    /// Whether the plain model leaves as much as a constant would, and the effect that is believed does not
-    /// bring it to much less.
+    /// Whether the plain model leaves as much as a constant would, and the accepted effect does not lower that
+    /// by much.
     fn not_fitted(&self, believed: Option<&Judged>) -> bool {
         let hopeless = self.criteria().start.hopeless;
         let left = believed.map_or(f64::INFINITY, |judged| nrmse(&judged.rank));
         nrmse(self.nominal.rank) >= hopeless && left > self.missing().rescued * hopeless
     }
 
-    /// Whether a candidate does better than the plain model on data that neither saw, with parameters that the
-    /// log determines.
+    /// Whether a candidate does better than the plain model on the validation data, with parameters that the log
+    /// determines.
     fn earned(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
         let unseen = advantage(self.unseen, &judged.losses, &self.criteria().window);
@@ -101,9 +101,9 @@ impl Evidence<'_> {
         better && determined(explanation, criteria.undetermined)
     }
 
-    /// Whether the starts of the runs show it. They judge nothing, since the initial state needs them, and often
-    /// have the only steps: an effect that acts in them makes what judges no better. It must make that no worse,
-    /// and what is left there must be more than noise.
+    /// Whether the starts of the runs show the effect. They are not validation data, because the initial state
+    /// is estimated from them. But they often have the only steps, so an effect that acts there need not improve
+    /// the validation error. It must not make it worse, and that error must be more than noise.
     fn shown_by_starts(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
         let explained = explained(self.nominal_fit, explanation.nrmse_fit);
@@ -114,8 +114,8 @@ impl Evidence<'_> {
             && explained > (criteria.matters * self.floor_fit).max(self.least)
     }
 
-    /// Whether the chosen explanation is what is missing: significantly better than no effect, by enough to
-    /// matter, and determined by the log.
+    /// Whether the chosen explanation is what is missing: significantly better than no effect, better by enough
+    /// to matter, and determined by the log.
     fn is_missing(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
         let left = nrmse(&judged.rank);
@@ -147,13 +147,13 @@ impl Evidence<'_> {
     }
 }
 
-/// What an explanation accounts for of an error, where it leaves another: squared errors add up.
+/// The part of an error that an explanation removes when it leaves `left`: squared errors add up.
 fn explained(error: f64, left: f64) -> f64 {
     (error.powi(2) - left.powi(2)).max(0.0).sqrt()
 }
 
 /// Whether the log determines any parameter of the effect. An effect that cannot be told from the plant's own
-/// parameters is not found, even if a test recording agrees with it.
+/// parameters counts as not found, even if a test recording agrees with it.
 fn determined(explanation: &Explanation, undetermined: f64) -> bool {
     let says_nothing = |p: &Estimate| match p.verdict {
         ParameterVerdict::Flat

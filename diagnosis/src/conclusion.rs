@@ -1,4 +1,4 @@
-//! What a diagnosis says.
+//! The result of a diagnosis: verdict, explanations, advice.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::observer::Correction;
 use crate::residual_force::ResidualForce;
 use crate::where_it_fails::Statement;
 
-/// An error, as the contract has it.
+/// An error, as in the JSON answer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Level {
     /// Free-run error relative to the standard deviation.
@@ -28,14 +28,14 @@ pub enum Conclusion {
     NothingMissing,
     /// Something is missing, and no effect of the library explains it.
     UnknownEffect,
-    /// The recording does not say enough: too short, without motion, or blind to what the test shows.
+    /// The recording does not say enough: it is too short, has no motion, or lacks what the test recording shows.
     DataInsufficient,
     /// The recording has a fault that makes any fit meaningless.
     LogFaulty,
-    /// The model leaves as much as a constant would from every start, and no effect of the library changes
-    /// that: nothing can be said of it.
+    /// From every start the model leaves as much as a constant would, and no effect of the library changes that.
+    /// Nothing can be concluded.
     NotFitted,
-    /// The work was cancelled. What was found until then is given; nothing is concluded from it.
+    /// The work was cancelled. What was found until then is reported, without a conclusion.
     Cancelled,
 }
 
@@ -54,12 +54,12 @@ pub struct Explanation {
     /// The effect and where.
     #[serde(flatten)]
     pub place: EffectAt,
-    /// Free-run error with it, on data it was not fitted to.
+    /// Free-run error with it, on the validation data.
     pub nrmse: f64,
     /// The effect's parameters, by their ids.
     pub parameters: BTreeMap<String, Estimate>,
     /// How many standard errors it is from having no influence: the root of the likelihood ratio over all
-    /// independent samples. NaN (`null`) where the work was cancelled after a first look at it.
+    /// independent samples. NaN (`null`) where the work was cancelled after a short fit of it.
     pub significance: f64,
     /// Candidates that these data cannot tell from it.
     pub indistinguishable_from: Vec<EffectAt>,

@@ -1,12 +1,12 @@
 //! Every threshold that decides a verdict, in one place.
 //!
-//! [`Criteria`] has them in groups. Each has a default, a unit and a reason: it is *derived* from
-//! something that can be computed, it is a *convention* of the field, or it is a *judgement*, made on
-//! recordings whose truth was known. `docs/criteria.md` says what becomes of the blind table when one of
-//! them is a fifth larger or smaller.
+//! [`Criteria`] has them in groups. Each has a default, a unit and a reason. It is *derived* from something
+//! that can be computed, it is a *convention* of the field, or it is a *judgement*, made on recordings whose
+//! truth was known. `docs/criteria.md` shows how the verdicts change when one of them is a fifth larger or
+//! smaller.
 //!
-//! Numbers that decide how something is computed, and not what is said of it (iterations, step sizes,
-//! grids), stand beside the code that computes it.
+//! Numbers that decide how something is computed (iterations, step sizes, grids) stand beside the code that
+//! computes it.
 
 mod table;
 
@@ -26,7 +26,7 @@ pub enum Reason {
     Judgement,
 }
 
-/// What there is to know of one criterion.
+/// The description of one criterion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Criterion {
     /// Its group and its name: `missing.beats`.

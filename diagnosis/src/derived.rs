@@ -1,4 +1,4 @@
-//! What follows from the fitted parameters of a plant, with the intervals that follow from theirs.
+//! Quantities that follow from a plant's fitted parameters, with intervals propagated from theirs.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 
 use crate::estimate::{Estimate, ParameterVerdict};
 
-/// The estimated parameters of a fit, as far as the data say.
+/// What a fit knows of its estimated parameters.
 pub(crate) struct Known<'a> {
     /// Their indices.
     pub(crate) free: &'a [usize],

@@ -25,11 +25,11 @@ use crate::sufficiency;
 use crate::trial::{FINAL, Judged, Nominal};
 use crate::where_it_fails::{predictable, where_it_fails};
 
-/// Adds every effect of the library to `model` at every place it fits, refits all parameters each
-/// time, and judges by the free run on data that the fits did not see.
+/// Adds every effect of the library to `model` at every channel it fits, and refits all parameters each time.
+/// Each is judged by its free run on validation data.
 ///
-/// A diagnosis that is cancelled says so ([`Conclusion::Cancelled`]), and has what was found until then:
-/// the fitted model, where it fails, and the candidates that were judged.
+/// A diagnosis that is cancelled says so ([`Conclusion::Cancelled`]). It has what was found until then: the
+/// fitted model, where it fails, and the candidates that were judged.
 ///
 /// # Errors
 ///
@@ -43,7 +43,7 @@ pub fn diagnose(
     diagnose_above(model, measurements, least, work)
 }
 
-/// As [`diagnose`]; an explanation must account for `least` of the standard deviation.
+/// As [`diagnose`], where an explanation must account for at least the share `least` of the standard deviation.
 pub(crate) fn diagnose_above(
     model: &Model,
     measurements: &Measurements<'_>,
@@ -51,7 +51,7 @@ pub(crate) fn diagnose_above(
     work: &Work<'_>,
 ) -> Result<Diagnosis, FitError> {
     measurements.check(model)?;
-    // It counts as cancelled until the last step is done. Each step adds what it finds.
+    // Each step adds what it finds. The verdict stays `Cancelled` until the last step is done.
     let mut diagnosis = Diagnosis::begun(measurements.faults);
     if refused(&mut diagnosis, model, measurements, work.criteria()) {
         return Ok(diagnosis);
@@ -216,7 +216,7 @@ fn solve_plain(
     Ok((plain, fitted))
 }
 
-/// The candidates that explain most, fitted; they are in the diagnosis, too, the best first.
+/// The candidates that explain most, fitted. The diagnosis lists them, the best first.
 fn search(
     diagnosis: &mut Diagnosis,
     nominal: &Nominal<'_>,

@@ -1,4 +1,4 @@
-//! Channels that are one place under two names.
+//! Channels at which an effect does the same up to a factor.
 
 use loopsight_core::{Channel, Place, Role};
 use loopsight_model::model::Model;
@@ -6,10 +6,10 @@ use loopsight_model::model::Model;
 /// Agreement of two derivatives: rounding over a few operations.
 const SAME: f64 = 1e-9;
 
-/// Whether an effort at `a` does to the plant what a constant times that at `b` does, wherever the plant is
-/// and with whatever input, and effects read the same signals there: friction in volts at the shaft of a
-/// motor and as an acceleration at its load. An effect at one of them is the same effect at the other one up
-/// to a linear change of its parameters, and no measurement tells the two apart.
+/// Whether two channels are equivalent: in every state and with every input, an effort at `a` does to the plant
+/// what a constant times that effort at `b` does, and effects read the same signals at both. An example is
+/// friction in volts at a motor's shaft, and as an acceleration at its load. An effect at `a` is then the effect
+/// at `b` with other parameters, and no measurement tells the two apart.
 pub(crate) fn equivalent(model: &Model, a: &Channel, b: &Channel) -> bool {
     let (Place::Effort(i), Place::Effort(j)) = (a.place, b.place) else {
         return false;
@@ -34,14 +34,13 @@ pub(crate) fn equivalent(model: &Model, a: &Channel, b: &Channel) -> bool {
     factor.is_some()
 }
 
-/// Of channels that are equivalent the one to keep: in the unit of an input where there is one.
+/// Whether `channel` is the one to keep of two equivalent channels: it has the unit of an input.
 pub(crate) fn preferred(model: &Model, channel: &Channel, over: &Channel) -> bool {
     let of_input = |c: &Channel| model.plant.inputs.iter().any(|input| input.unit == c.unit);
     of_input(channel) && !of_input(over)
 }
 
-/// What one unit of an effort adds to the rates of the states, at a place and an input away from rest or
-/// not.
+/// What one unit of an effort adds to the rates of the states, with state and input `away` from rest.
 fn answers(model: &Model, effort: usize, away: f64) -> Vec<f64> {
     let nx = model.n_states();
     let x: Vec<f64> = (0..nx).map(|i| away * (1.0 + 0.3 * i as f64)).collect();

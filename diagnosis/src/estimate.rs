@@ -6,7 +6,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ParameterVerdict {
-    /// Pinned by the data.
+    /// Determined by the data.
     Good,
     /// Not estimated: frozen at the value of the file.
     #[serde(rename = "held")]

@@ -1,7 +1,7 @@
-//! Which experiment would tell: inputs that separate two effects, or that pin a parameter.
+//! Experiment design: inputs that separate two effects, or that determine a parameter.
 //!
-//! Two effects are separated by the inputs under which the one, fitted as well as it can be to a
-//! robot that has the other, stays farthest from it (T-optimality), whichever of the two is true:
+//! Two effects are separated as follows (T-optimality). One is taken as true, the other is fitted to its
+//! response. The best inputs keep the two farthest apart, whichever of them is true:
 //!
 //! ```text
 //! d²(u) = min over { A true, B fitted; B true, A fitted } of  min_θ Σ_k |(y(k) - ŷ(k, θ))/σ|²
@@ -10,21 +10,24 @@
 //!
 //! with `y` the noise-free response of the model with an effect of noticeable size, `θ` all free
 //! parameters of the model and of the rival, and `σ` the noise of the sensors. `d` is the number of
-//! standard deviations by which two models known in every number would be told apart in white
-//! noise. A recording must also say what the noise is and leave data to judge by, so that an
-//! experiment is made long enough for `d = 20` rather than for the 5 of a single test.
+//! standard deviations between two exactly known models in white noise. A single test would need `d = 5`. A
+//! recording must also tell what the noise is and leave validation data, so experiments are made long enough
+//! for `d = 20`.
 //!
-//! A parameter is pinned by the inputs that make its standard error least (c-optimality), with `J`
-//! the exact sensitivities over `σ` and the noise of encoders coloured as rounding colours it;
-//! without a question, by those that make the largest relative standard error of all least:
+//! A parameter is determined best by the inputs that make its standard error least (c-optimality). Where no
+//! parameter is asked for, the largest relative standard error is made least. `J` are the exact sensitivities
+//! over `σ`, and the noise of encoders is coloured by rounding:
 //!
 //! ```text
 //! s² = cᵀ (JᵀJ)⁻¹ Jᵀ cov(e) J (JᵀJ)⁻¹ c
 //! ```
 //!
-//! Assumptions: the model's values are close enough to predict its response; the robot starts at rest; distances
-//! count the noise as white, as a diagnosis does (that of encoder counts is smaller at low frequencies); the
-//! chosen inputs are the best of a list, and not of all possible ones.
+//! Assumptions:
+//!
+//! * The model's values are close enough to predict its response.
+//! * The robot starts at rest.
+//! * Noise is white, as in a diagnosis. (That of encoder counts is smaller at low frequencies.)
+//! * The chosen inputs are the best of a list, not of all possible ones.
 //!
 //! References: A. C. Atkinson, V. V. Fedorov (1975), "The design of experiments for discriminating
 //! between two rival models", Biometrika 62, 57–70; A. C. Atkinson, A. N. Donev (1992), "Optimum
@@ -56,7 +59,7 @@ use shapes::Shape;
 const HORIZON: f64 = 20.0;
 /// Gauss–Newton steps at the first look, and for the best.
 const STEPS: (usize, usize) = (2, 8);
-/// Experiments that are looked at twice.
+/// Experiments that get a second, more exact look.
 const BEST: usize = 6;
 /// Longest integration step, s: far below what any sensor sees.
 const LOOK_STEP: f64 = 0.005;
@@ -170,8 +173,8 @@ impl<'m> Design<'m> {
         self.work.tell(Stage::Experiments, now, of as u64);
     }
 
-    /// Squared distances over time, the least of those of the directions; and the share of the
-    /// effect's own distance that this is.
+    /// Squared distances over time, the least of those of the directions. And what share of the effect's own
+    /// distance that is.
     fn distance(
         &self,
         rivals: &Rivals,
@@ -188,7 +191,7 @@ impl<'m> Design<'m> {
                 let least = |a: &Distance, b: &Distance| a.total.total_cmp(&b.total);
                 Ok::<_, Cancelled>(fitted.into_iter().min_by(least))
             };
-            // Whether an effect is there at all: a refit may hide it, so not after one.
+            // The question whether an effect is there at all is asked without a refit, which may hide it.
             let own_steps = if rivals.places.len() > 1 { steps } else { 0 };
             let own = rival(
                 self.model,
@@ -219,8 +222,8 @@ impl<'m> Design<'m> {
         Ok(least.unwrap_or_default())
     }
 
-    /// The shapes under which every signal moves that moves under the usual one: a recording in
-    /// which one does not carries no fit of the whole model.
+    /// The shapes under which every signal moves that moves under the usual one. A recording in which one does
+    /// not move cannot determine the whole model.
     fn moving(&self) -> Result<Vec<Shape>, QuestionError> {
         let moves = |shape: Shape| -> Result<Vec<bool>, QuestionError> {
             let run = response(
@@ -289,7 +292,7 @@ impl<'m> Design<'m> {
         let mut duration = horizon;
         let same = apart.share < criteria.same || needed > criteria.hopeless_s;
         if self.limits.duration.is_none() && !same {
-            // Refitted to a shorter recording a rival comes closer: once more at the new length.
+            // A rival that is refitted to a shorter recording comes closer: computed again at the new length.
             let mut longest = criteria.longest_s;
             for _ in 0..6 {
                 duration = self.allowed(needed, longest);

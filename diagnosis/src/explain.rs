@@ -14,7 +14,7 @@ use crate::trial::{Judged, Nominal};
 /// Most standard errors that are reported.
 const MOST: f64 = 1e6;
 
-/// A candidate that was fitted to the end.
+/// The explanation of a candidate with a full fit.
 pub(crate) fn explain(
     judged: &Judged,
     fit: &Fit,
@@ -36,7 +36,7 @@ pub(crate) fn explain(
     })
 }
 
-/// A candidate that was only looked at, when the work was cancelled.
+/// The explanation of a candidate that had only a short fit when the work was cancelled.
 pub(crate) fn explain_look(judged: &Judged) -> Explanation {
     let candidate = &judged.candidate;
     let mut model = candidate.model.clone();
@@ -62,7 +62,7 @@ fn place(candidate: &Candidate) -> EffectAt {
     }
 }
 
-/// The candidate's own of the parameters that were fitted.
+/// The candidate's own parameters, with their estimates.
 fn parameters(
     candidate: &Candidate,
     fitted: &BTreeMap<String, Estimate>,
@@ -73,7 +73,7 @@ fn parameters(
         let Some(estimate) = fitted.get(&parameter.name) else {
             continue;
         };
-        // What was tried counts as found: a number of teeth is not fitted but chosen.
+        // A parameter that is chosen from a list, such as a number of teeth, counts as found.
         if parameter.free || !parameter.declaration.starts.is_empty() {
             own.insert(candidate.name(i), estimate.clone());
         }

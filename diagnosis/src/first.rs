@@ -1,4 +1,4 @@
-//! What the first samples of a run say of its start.
+//! Weights of the first samples of a run, from which its initial state is estimated.
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
@@ -8,20 +8,23 @@ use crate::floor::noise;
 
 /// How many times as much the first sample of each run counts as any other, by run and signal.
 ///
-/// At the start of a run a model has had no time to go wrong: a signal differs from the measurement by
-/// the noise `σ` of its sensor, while later samples differ by the error of the model as well. Weighted
-/// by what they are known to, with `e` the share of the signal's deviation `std` that a model is
-/// commonly wrong by,
+/// The first sample differs from the model only by the noise `σ` of its sensor; later samples differ by the
+/// error of the model as well. With `std` the signal's standard deviation and `e` the share of it that a model
+/// is commonly wrong by,
 ///
 /// ```text
 /// weight = e std/σ, between 1 and a limit
 /// ```
 ///
-/// the start stays where it was measured instead of making up for missing physics. `σ` is what noise and
-/// resolution leave of the signal, or what the first sample is off the line through the two that follow (an
-/// absurd reading holds nobody), or how far the signal moves while a measurement may still be under way: the
-/// state of a run that is cut out of a motion is not what a late sensor says of its first instant. (The prior of a start is that of a Kalman filter, L. Ljung, 1999,
-/// "System Identification", 2nd edition, section 4.3.)
+/// the start stays where it was measured, and does not make up for missing physics. `σ` is the largest of
+///
+/// * the noise and resolution of the signal;
+/// * the distance of the first sample from the line through the next two, so that an outlier counts little;
+/// * how far the signal moves while a measurement may be late: a late sensor does not tell the state at the
+///   first instant of a run that was cut out of a motion.
+///
+/// (The prior of a start is that of a Kalman filter, L. Ljung, 1999, "System Identification", 2nd edition,
+/// section 4.3.)
 pub(crate) fn first_weights(model: &Model, runs: &[Run], criteria: &Criteria) -> Vec<Vec<f64>> {
     let known: Vec<(f64, f64)> = (model.measured.iter().enumerate())
         .map(|(i, m)| noise(&m.sensor, i, runs, &criteria.log))

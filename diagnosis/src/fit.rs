@@ -52,7 +52,7 @@ pub fn fit(
     Ok(result)
 }
 
-/// Compares a fitted model with what it was fitted to, and with what it is judged on.
+/// Compares a fitted model with the recording it was fitted to, and with the one it is judged on.
 fn compared(
     result: &mut Fit,
     measurements: &Measurements<'_>,

@@ -22,7 +22,7 @@ pub struct Fit {
     /// What follows from the plant's parameters, by name: see [`loopsight_core::Derived`].
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub derived: BTreeMap<String, Estimate>,
-    /// How they were found.
+    /// The method that found them.
     pub method: Method,
     /// Free-run error before the fit; absent where the file gave no values.
     pub nrmse_before: Option<f64>,
@@ -30,8 +30,8 @@ pub struct Fit {
     pub nrmse_fit: f64,
     /// Iterations (output error) or samples (recursive least squares).
     pub iterations: u64,
-    /// Whether the fit to the free run arrived, and from where; none for recursive least squares and for
-    /// one that was cancelled.
+    /// Whether the fit to the free run converged, and from which start. None for recursive least squares and for
+    /// a cancelled fit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub convergence: Option<Convergence>,
     /// Combinations of parameters that the data do not determine, in words.
@@ -50,7 +50,7 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// What is left of a fit that was cancelled: the values of `model`, which leave an error of `nrmse`.
+    /// The result of a cancelled fit: the values of `model`, with the error `nrmse`.
     pub(crate) fn cancelled(model: Model, method: Method, nrmse: f64, iterations: u64) -> Self {
         let parameters = model.parameters.iter().filter_map(|parameter| {
             let estimate = Estimate {

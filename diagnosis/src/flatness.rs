@@ -1,4 +1,4 @@
-//! What the data do not determine.
+//! Parameters, and combinations of parameters, that the data do not determine.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -37,7 +37,7 @@ impl Flatness {
     ) -> Self {
         let least = criteria.flat * criteria.flat;
         let n = norms.len();
-        // The unknowns are scaled by their influence. Whether one is dead is asked on the scale of its
+        // The unknowns are scaled by their influence, but whether one is dead is decided on the scale of its
         // declaration.
         let dead: Vec<bool> = norms
             .iter()

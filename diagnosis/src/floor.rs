@@ -12,12 +12,12 @@ use crate::score::Tally;
 /// * Encoder counts: the standard deviation of rounding, from their resolution
 ///   ([`loopsight_model::sensor::Encoder::noise`]).
 /// * Other sensors: differences of order `n` of the measurement. In them a smooth motion vanishes, and white
-///   noise of variance `σ²` has the variance `σ² (2n)!/(n!)²`. The median keeps jumps of the motion out. Of
-///   the orders 1 to 4 the one that says least counts: motion adds to low orders, and noise that alternates
-///   (differences of counts) to high ones. The noise is never below the rounding of the log, its least change
-///   over `√12`.
+///   noise of variance `σ²` has the variance `σ² (2n)!/(n!)²`. A median leaves out jumps of the motion. Of the
+///   orders 1 to 4 the least result counts: motion adds to low orders, and noise that alternates (differences
+///   of counts) adds to high ones. The noise is never below the rounding of the log, its least change over
+///   `√12`.
 /// * A sensor that is read more often than it has a new value (a bus that updates every 20 ms, a coarse scale):
-///   its value is old by anything between zero and its update time `h`. Differences are taken between new
+///   the age of its value is anything between zero and its update time `h`. Differences are taken between new
 ///   values, and the age adds `(rate · h)²/12`.
 pub(crate) fn floor(model: &Model, runs: &[Run], criteria: &LogCriteria) -> f64 {
     let n = model.measured.len();

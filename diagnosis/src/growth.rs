@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::criteria::FreeRunCriteria;
 
-/// Beyond this growth the answer is certain, and numbers would soon overflow.
+/// Growth beyond which a model is certainly unstable, and numbers would soon overflow.
 const CERTAINLY: f64 = 1e9;
 /// Instants of a run from which errors are followed, as fractions of its length.
 const STARTS: [f64; 3] = [0.0, 0.25, 0.5];
@@ -54,7 +54,7 @@ pub(crate) fn unstable(path: &Path, criteria: &FreeRunCriteria) -> bool {
     let mut transition = DMatrix::identity(first.nrows(), first.ncols());
     for a in &path.a {
         transition = a * transition;
-        // Beyond that it is certain, and the numbers would soon end.
+        // Beyond that the model is certainly unstable, and numbers would soon overflow.
         if transition.amax() > CERTAINLY {
             break;
         }
@@ -62,10 +62,10 @@ pub(crate) fn unstable(path: &Path, criteria: &FreeRunCriteria) -> bool {
     radius(&transition, &vec![1.0; first.ncols()]) > criteria.exponential
 }
 
-/// How errors of the state grow, where they grow too much for a free run.
+/// How fast errors of the state grow, where that is too fast for a free run.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Growth {
-    /// Time in which they do, s.
+    /// Time after which they are too large, s.
     pub(crate) horizon: f64,
     /// Time in which they double, where they grow exponentially, s.
     pub(crate) doubling: Option<f64>,
@@ -74,8 +74,8 @@ pub(crate) struct Growth {
 }
 
 impl Growth {
-    /// Follows errors of the size of the states' deviations through `paths`; `None` where they stay
-    /// below so many times the `deviation` of each measured signal.
+    /// Follows errors as large as the states' standard deviations along `paths`. `None` where they stay below a
+    /// multiple (`growth` of the criteria) of the `deviation` of each measured signal.
     pub(crate) fn of(
         paths: &[Path],
         deviation: &[f64],
@@ -121,7 +121,7 @@ impl Growth {
                         break;
                     }
                 }
-                // In a stiff system an error becomes large for a moment, and is soon over.
+                // In a stiff system an error becomes large for a moment, and then dies out.
                 if let (Some((time, rate)), true) = (grown, late > criteria.growth) {
                     times.push(time);
                     rates.push(rate);

@@ -1,4 +1,4 @@
-//! Validation: which samples a fit may see, and how the others judge it.
+//! Validation: which samples a fit may see, and how well it does on the held-out ones.
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
@@ -9,14 +9,14 @@ use crate::prediction::{InitialStates, Solution, predict};
 use crate::progress::{Cancelled, Work};
 use crate::score::Tally;
 
-/// Recordings divided into what a fit sees and what judges it.
+/// Recordings divided into fitting data and validation data.
 pub(crate) struct Holdout<'a> {
     pub(crate) runs: &'a [Run],
     /// Recording of its own to be judged on.
     pub(crate) test: Option<&'a [Run]>,
     /// By run and sample of `runs`: whether a fit sees it; all where there is a test recording.
     pub(crate) seen: Option<Vec<Vec<bool>>>,
-    /// Standard deviations of the signals in what judges, and in what is seen.
+    /// Standard deviations of the signals in the validation data, and in the fitting data.
     std_test: Vec<f64>,
     std_fit: Vec<f64>,
 }
@@ -24,9 +24,9 @@ pub(crate) struct Holdout<'a> {
 impl<'a> Holdout<'a> {
     /// With `test`, the fits see all of `runs`, and `test` judges.
     ///
-    /// Without, each run is cut into blocks of time, and one in every few judges: other blocks in each run,
-    /// and never the first, which the initial state needs. The free run goes on through these blocks, so that
-    /// delays, friction and slow changes are judged in motion and over the whole length.
+    /// Without, each run is cut into blocks of time, and one in every few is held out for validation: different
+    /// blocks in each run, and never the first, which the initial state needs. The free run goes on through
+    /// held-out blocks, so delays, friction and slow changes are judged in motion and over the whole length.
     pub(crate) fn new(
         model: &Model,
         runs: &'a [Run],
@@ -86,7 +86,7 @@ impl<'a> Holdout<'a> {
         Ok(Judgement { losses, rank })
     }
 
-    /// Losses on what was seen.
+    /// Losses on the fitting data.
     pub(crate) fn fitted(
         &self,
         model: &Model,
@@ -97,7 +97,7 @@ impl<'a> Holdout<'a> {
         Ok(self.part(&all, true))
     }
 
-    /// Of the losses on all samples of `runs` those that a fit saw, or did not.
+    /// Of the losses on all samples of `runs`, those on the fitting data or those on the held-out data.
     fn part(&self, all: &Losses, seen: bool) -> Losses {
         let Some(mask) = &self.seen else {
             return all.clone();
@@ -110,13 +110,13 @@ impl<'a> Holdout<'a> {
     }
 }
 
-/// How well a solution does.
+/// The losses of a solution.
 pub(crate) struct Judgement {
-    /// Losses on what was not seen: mean over the signals of their squared errors over their variances.
+    /// Losses on the validation data: mean over the signals of their squared errors over their variances.
     pub(crate) losses: Losses,
-    /// What candidates are ranked by: losses on seen and unseen samples. A transient happens once in a run,
-    /// and whether it is explained must count wherever it falls. A few more parameters cannot fake that on
-    /// thousands of samples.
+    /// Losses that candidates are ranked by: those on all samples, held out or not. A transient happens once in
+    /// a run, and must count wherever it falls. Over thousands of samples a few more parameters gain nothing by
+    /// that.
     pub(crate) rank: Losses,
 }
 

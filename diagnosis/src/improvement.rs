@@ -1,4 +1,4 @@
-//! What an improvement says.
+//! The result of an improvement.
 
 use serde::Serialize;
 
@@ -13,9 +13,9 @@ pub struct ImprovementStep {
     /// The round whose diagnosis named it: its place among [`Improvement::diagnoses`].
     #[serde(skip)]
     pub round: usize,
-    /// Free-run error on what the model was fitted to.
+    /// Free-run error on the fitting data.
     pub nrmse_fit: f64,
-    /// Free-run error on what it was not fitted to.
+    /// Free-run error on the validation data.
     pub nrmse_test: f64,
     /// What the data cannot tell from it, with all that was added later in the model.
     #[serde(skip)]

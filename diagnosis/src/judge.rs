@@ -4,8 +4,7 @@ use crate::criteria::WindowCriteria;
 use crate::progress::{Cancelled, Work};
 use crate::window;
 
-/// Weighted squared errors of the samples that judge, in time order; runs stand one after the
-/// other.
+/// Weighted squared errors of the validation samples, in time order, one run after the other.
 pub(crate) type Losses = Vec<f64>;
 
 /// Mean difference of two loss series over its standard error (F. X. Diebold, R. S. Mariano, 1995,
@@ -84,7 +83,7 @@ fn independent(losses: &Losses, work: &Work<'_>) -> Result<f64, Cancelled> {
     Ok(n as f64 / time.max(1.0))
 }
 
-/// Root of the mean loss: the `nrmse` over the samples that judge.
+/// Root of the mean loss: the `nrmse` over the validation samples.
 pub(crate) fn nrmse(losses: &Losses) -> f64 {
     (losses.iter().sum::<f64>() / losses.len().max(1) as f64).sqrt()
 }

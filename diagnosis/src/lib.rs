@@ -1,5 +1,5 @@
-//! Compare a model with measurements, fit it, find which physical effect is missing, and say what to record
-//! next.
+//! Compare a model with measurements, fit it, find which physical effect is missing, and design the next
+//! experiment.
 //!
 //! # Workflow
 //!
@@ -8,9 +8,9 @@
 //!    under which conditions the error is large.
 //! 2. [`fit`](fit()): which parameters make the free run agree best, and how well do the data determine each?
 //!    Intervals hold for coloured noise; what is not determined is named.
-//! 3. [`diagnose`](diagnose()): which effect of the library is missing? Each is added at every place it fits, all
-//!    parameters are fitted again, and it is judged on data that no fit has seen. Effects that the data cannot
-//!    tell apart are named together.
+//! 3. [`diagnose`](diagnose()): which effect of the library is missing? Each is added at every channel it fits,
+//!    all parameters are fitted again, and it is judged on validation data. Effects that the data cannot tell
+//!    apart are named together.
 //! 4. [`improve`](improve()): add the missing effect and begin again, until nothing more is missing.
 //! 5. [`experiment`](experiment()): which inputs tell two effects apart, or determine a parameter?
 //! 6. [`residual_force`](residual_force()): where no effect of the library fits, what does the missing force
@@ -54,16 +54,15 @@
 //!
 //! # Long work
 //!
-//! A diagnosis takes seconds to minutes. [`Work`] tells how far it is ([`Progress`]) and stops it
-//! ([`CancelToken`]); work that is cancelled keeps what it has found. [`Work::decided_by`] gives other
-//! [`Criteria`] than the default ones: every threshold that decides a verdict is there, with its unit and its
-//! reason.
+//! A diagnosis takes seconds to minutes. [`Work`] reports how far it is ([`Progress`]) and stops it
+//! ([`CancelToken`]); work that is cancelled keeps what it has found. [`Work::decided_by`] sets other
+//! [`Criteria`] than the default ones: these are all thresholds that decide a verdict, each with unit and reason.
 //!
 //! # Features
 //!
 //! None: the crate needs `std`, and builds for `wasm32-unknown-unknown` as well. The effects that are tried are
-//! those linked into the program: the library is `loopsight-plants`, and effects declared elsewhere or written
-//! as expressions in the model file count as well.
+//! those linked into the program. The library of them is `loopsight-plants`; effects of other crates and
+//! expressions in the model file are tried as well.
 
 mod advice;
 mod arrive;

@@ -1,4 +1,4 @@
-//! What a model is compared with, fitted to and judged on.
+//! The measurements that a model is compared with, fitted to and judged on.
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
@@ -11,15 +11,14 @@ use crate::error::CompareError;
 pub struct Measurements<'a> {
     /// The runs that parameters are fitted to.
     pub runs: &'a [Run],
-    /// Other runs that the fitted model is judged on (validation); `None`: parts of `runs` that the
-    /// fits leave out.
+    /// Validation runs, which the fitted model is judged on; `None`: parts of `runs` are held out for that.
     pub test: Option<&'a [Run]>,
     /// Faults that were found in the log.
     pub faults: &'a [Fault],
 }
 
 impl<'a> Measurements<'a> {
-    /// Runs without a fault; parts of them are left out of the fits to judge on.
+    /// Runs without a fault; parts of them are held out for validation.
     pub fn new(runs: &'a [Run]) -> Self {
         Self {
             runs,
@@ -63,7 +62,7 @@ impl<'a> Measurements<'a> {
         Ok(())
     }
 
-    /// The runs that judge where there are any, else those to fit to.
+    /// The validation runs where there are any, else those to fit to.
     pub(crate) fn judging(&self) -> &'a [Run] {
         self.test.unwrap_or(self.runs)
     }

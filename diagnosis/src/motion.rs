@@ -1,6 +1,6 @@
-//! The direction of motion that a measured signal tells.
+//! The direction of motion, from a measured signal.
 
-/// What tells the direction of motion of a signal.
+/// How a signal tells the direction of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Motion {
     /// The sign of a speed.
@@ -50,12 +50,12 @@ pub(crate) fn rest(speeds: impl Iterator<Item = f64>, share: f64) -> f64 {
     share * (squares / n.max(1.0)).sqrt()
 }
 
-/// What tells the direction, sample by sample.
+/// The quantity whose sign is the direction, sample by sample.
 pub(crate) fn speed(time: &[f64], values: &[f64], motion: Motion) -> Vec<f64> {
     if motion != Motion::Position {
         return values.to_vec();
     }
-    // Over two samples to either side: quantised positions stand still in between.
+    // Over two samples to either side, because quantised positions often do not change from one to the next.
     let last = time.len().saturating_sub(1);
     (0..time.len())
         .map(|k| {

@@ -138,11 +138,11 @@ pub(crate) struct Block {
 /// Covariance of a least-squares estimate when the noise of the signals is coloured:
 /// `(JᵀJ)⁻¹ Jᵀ cov(e) J (JᵀJ)⁻¹`.
 ///
-/// A noise model [`Arma`] per signal takes the bulk of the colour out of the residuals, `ε = H⁻¹ e`
-/// and `h = Hᵀ J`, so that `Jᵀ e = Σ_k s(k)` with the scores `s(k) = Σ_i h_i(k) ε_i(k)` over the
-/// signals `i`. Some colour is left: rounding at constant speed is periodic, signals from the same encoders round
-/// together, and noise is larger in motion than at rest. It is in the autocovariance of the scores, weighted
-/// by Bartlett's window:
+/// A noise model [`Arma`] for each signal removes most of the colour from the residuals: `ε = H⁻¹ e` and
+/// `h = Hᵀ J`, so that `Jᵀ e = Σ_k s(k)` with the scores `s(k) = Σ_i h_i(k) ε_i(k)` over the signals `i`. Some
+/// colour is left: rounding at constant speed is periodic, signals of the same encoders are rounded together,
+/// and noise is larger in motion than at rest. The autocovariance of the scores accounts for it, weighted by
+/// Bartlett's window:
 ///
 /// ```text
 /// Jᵀ cov(e) J ≈ Σ_|l|<=L (1 - |l|/(L+1)) Σ_k s(k) s(k-l)ᵀ

@@ -1,4 +1,4 @@
-//! Whether a model can be simulated from the inputs alone, and the observer that corrects it where it cannot.
+//! The observer of models that cannot be simulated from the inputs alone, and the test for them.
 
 use std::borrow::Cow;
 
@@ -19,7 +19,7 @@ use crate::progress::{Cancelled, Work};
 pub struct Correction {
     /// `unstable` or `integrating`.
     pub because: Because,
-    /// Time in which the observer forgets, s.
+    /// Time constant with which the observer forgets old measurements, s.
     pub horizon_s: f64,
     /// In words.
     pub statement: String,
@@ -36,7 +36,7 @@ pub enum Because {
 }
 
 impl Correction {
-    /// What was done to `runs`; `None` where they are simulated from the inputs alone.
+    /// The correction of `runs`; `None` where they are simulated from the inputs alone.
     pub(crate) fn of(runs: &[Run]) -> Option<Self> {
         let observer = runs.iter().find_map(|run| run.observer())?;
         let horizon = observer.horizon;
@@ -73,14 +73,14 @@ fn seconds(value: f64) -> String {
     format!("{value:.decimals$} s")
 }
 
-/// Samples of one run over which the growth of errors is looked at.
+/// Samples of one run over which the growth of errors is followed.
 const LOOKED_AT: usize = 20_000;
 /// Shortest horizon, and that of the first look, in sampling periods.
 const SHORTEST: f64 = 10.0;
 const FIRST: f64 = 20.0;
 /// Noise is taken to be at least this share of a signal's standard deviation.
 const LEAST_NOISE: f64 = 1e-4;
-/// Cap on the uncertainty of a state that is not observed, in its deviations.
+/// Largest uncertainty of a state that is not observed, in its standard deviations.
 const FURTHEST: f64 = 1e3;
 
 /// `runs`, each with an observer where `model` needs one; unchanged where it does not.
@@ -130,7 +130,7 @@ pub(crate) fn unstable_at_rest(
         rows(n_inputs, 0.0),
         rows(n_measured, f64::NAN),
     );
-    // Instants that do not increase are no experiment, and nothing leaves its rest within them.
+    // Instants that do not increase are no experiment.
     let Ok(rest) = rest else {
         return Ok(false);
     };
@@ -159,7 +159,7 @@ pub(crate) fn attach_observer_for<'r>(
     Ok(Cow::Owned(observed))
 }
 
-/// `others` with the observer that suits the horizon of `runs` and the `values` it was made for.
+/// `others` with an observer of the same horizon and for the same `values` as that of `runs`.
 pub(crate) fn attach_same_observer<'r>(
     model: &Model,
     others: &'r [Run],
@@ -177,10 +177,10 @@ pub(crate) fn attach_same_observer<'r>(
     attach_observer_for(model, &observer.values, others, &growth, work)
 }
 
-/// What the gains of an observer are found with.
+/// What the gains of an observer are computed from.
 struct Design<'a> {
-    /// Without the effects that have states or memory: gains need not be exact, and they correct the plant's
-    /// state only.
+    /// The model without the effects that have states or memory. Gains need not be exact, and they correct only
+    /// the plant's state.
     model: Model,
     values: &'a [f64],
     /// By signal.
@@ -280,9 +280,9 @@ impl<'a> Design<'a> {
     }
 
     /// An extended Kalman filter with fading memory and without process noise: a measurement made `t` ago has the
-    /// weight `e^(-2t/fade)`. So no error lasts longer, and an unstable mode is stabilised. With `A` the
-    /// derivative of the state by the state before, and `C` that of the measurement (a sensor of means sees the
-    /// interval, and not its end),
+    /// weight `e^(-2t/fade)`. So no error lasts longer, and an unstable mode is stabilised. `A` is the derivative
+    /// of the state by the state before. `C` is that of the measurement, which for a sensor of means depends on
+    /// the whole interval.
     ///
     /// ```text
     /// P <- e^(2h/fade) P    S = C P Cᵀ + R    K = A P Cᵀ S⁻¹    P <- A P Aᵀ - K S Kᵀ
@@ -306,7 +306,7 @@ impl<'a> Design<'a> {
             return Ok(Some(p));
         }
         let values: Vec<Dual> = self.values.iter().map(|v| Dual::of(*v)).collect();
-        // As many simulators as it takes to carry the derivatives by all states.
+        // One simulator for every few states: a dual number has a fixed number of derivatives.
         let mut simulators: Vec<Simulator<'_, Dual>> = (0..nx)
             .step_by(DUAL_WIDTH)
             .map(|_| Simulator::new(&self.model, &values))

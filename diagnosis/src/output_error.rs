@@ -38,11 +38,10 @@ use crate::unshown::tied;
 /// numbers through the integrator). Missing measurements count nothing. (L. Ljung, 1999, "System
 /// Identification", 2nd edition, section 7.2 and chapter 10; output error is section 4.2.)
 ///
-/// Where the residuals turn out to be those of rounded counts (a moving average with `c` near -1
-/// and nothing slower, see [`noise::Arma`]), a second pass weights them by that: the maximum
-/// likelihood estimate for `e(k) = ε(k) + c ε(k-1)`, with the value of `ε` before each run as one
-/// more unknown. Other colours are left as they are: they are a model error, and a fit to the free
-/// run should see it.
+/// The residuals may turn out to be those of rounded counts: a moving average with `c` near -1 and nothing
+/// slower, see [`noise::Arma`]. Then a second pass weights them accordingly. It is the maximum likelihood
+/// estimate for `e(k) = ε(k) + c ε(k-1)`, with the value of `ε` before each run as one more unknown. Other
+/// colours come from errors of the model, and are not weighted away.
 pub(crate) fn fit(
     model: &Model,
     runs: &[Run],
@@ -89,14 +88,15 @@ fn in_two_passes(problem: &mut Problem<'_>, settings: &FitSettings) -> Result<Fi
     Ok(fit)
 }
 
-/// A model and recordings that a fit can begin with.
+/// A model and recordings, ready for a fit.
 pub(crate) struct Prepared<'a> {
     pub(crate) model: Cow<'a, Model>,
     pub(crate) runs: Cow<'a, [Run]>,
 }
 
-/// An observer is made for the parameters, and parameters are fitted with the observer, in rounds. These are the
-/// rounds' horizons as shares of the last one: from wrong parameters a long free run leads nowhere.
+/// Horizons of the rounds of a fit with an observer, as shares of the last one. Each round designs the observer
+/// for the present parameters, and fits the parameters with it. Horizons begin short, because with wrong
+/// parameters a long free run leads nowhere.
 const ROUNDS: [f64; 4] = [0.25, 0.5, 1.0, 1.0];
 /// Effort of the fit of one round.
 const ROUND: Effort = Effort {
@@ -107,9 +107,8 @@ const ROUND: Effort = Effort {
 /// `model` and `runs` unchanged where the model can be simulated from the inputs alone.
 ///
 /// Where it cannot, the runs get an observer, and the model gets the fitted values that the observer was made for.
-/// An observer that suits the model makes its errors white. Only white errors leave the parameters unbiased
-/// where the inputs come from a loop that feeds the measurements back (L. Ljung, 1999, "System Identification",
-/// 2nd edition, section 13.4).
+/// An observer that suits the model makes the errors white. Inputs from a feedback loop bias the parameters
+/// unless the errors are white (L. Ljung, 1999, "System Identification", 2nd edition, section 13.4).
 pub(crate) fn prepare<'a>(
     model: &'a Model,
     runs: &'a [Run],
@@ -142,7 +141,7 @@ pub(crate) fn prepare<'a>(
         let mut problem = Problem::new(&present, &prepared.runs, work.silently())?;
         let states = InitialStates::guess(&present, &values, &prepared.runs).states;
         values = problem.solve_from(&values, &states, ROUND)?.values;
-        // The observer stays: with it errors may no longer grow, and without it they would again.
+        // The observer stays, even if errors no longer grow with it: without it they would again.
         growth = self::growth(model, &values, runs, work)?.unwrap_or(growth);
     }
     prepared.runs = attach_observer_for(model, &values, runs, &growth, work)?;
@@ -151,9 +150,9 @@ pub(crate) fn prepare<'a>(
     Ok(prepared)
 }
 
-/// Values with which the model needs no observer, though with those it begins with it would: an arm on a
-/// spring of no stiffness falls, and one that hangs swings back. They are a fit's to the free run, where that
-/// leads to less than a part of what a constant leaves.
+/// Values with which the model needs no observer, although it needs one with its first values: an arm on a spring
+/// of stiffness 0 falls, but with some stiffness it swings back. They come from a fit to the free run, if that
+/// leaves an error well below that of a constant.
 fn free_values(
     model: &Model,
     runs: &[Run],
@@ -176,8 +175,8 @@ fn free_values(
     Ok(stands.then_some(values))
 }
 
-/// The file's values, or those of a regression where it gives none; sizes of the declarations where
-/// the plant offers no regression.
+/// The file's values, or those of a regression where it gives none. Where the plant offers no regression, the
+/// typical sizes that the declarations give.
 fn first_values(
     model: &Model,
     runs: &[Run],
@@ -207,8 +206,8 @@ fn row_norms(jacobian: &DMatrix<f64>) -> (Vec<f64>, f64) {
     (norms, median)
 }
 
-/// A shaft that is about to break loose acts like a switch: at that instant the free run is extremely sensitive to
-/// all parameters alike. One such row would hide what the other rows say.
+/// Limits steep rows of a Jacobian. A shaft that is about to break loose acts like a switch: at that instant the
+/// free run is extremely sensitive to all parameters alike. One such row would dominate all others.
 fn limit_rows(jacobian: &mut DMatrix<f64>, steep: f64) {
     let (norms, median) = row_norms(jacobian);
     let limit = steep * median;
@@ -223,18 +222,18 @@ impl Problem<'_> {
     /// The steepest row of the Jacobian over the one in the middle.
     pub(crate) fn steepness(&self, at: &DVector<f64>) -> Result<f64, Cancelled> {
         let (mut norms, median) = row_norms(&self.linearise(at)?.1);
-        // What counts more than others is not steeper.
+        // First samples have a larger weight, but are not steeper.
         for row in self.first_rows() {
             norms[row] = 0.0;
         }
         Ok(norms.into_iter().fold(0.0, f64::max) / median)
     }
 
-    /// What is said of a solution.
+    /// The fit that a solution gives: estimates, intervals, errors.
     pub(crate) fn result(&self, solution: &DVector<f64>) -> Result<Fit, Cancelled> {
         let (mut values, _) = self.unpack(solution);
         for i in &self.free {
-            // The solver stays strictly inside the range. Next to its end, the end is meant.
+            // The solver stays strictly inside the range. A value next to the end means the end.
             let declaration = self.model.parameters[*i].declaration;
             for end in [declaration.bounds().0, declaration.bounds().1] {
                 if (values[*i] - end).abs() < 1e-9 * self.model.parameters[*i].scale() {

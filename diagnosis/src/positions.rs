@@ -15,11 +15,14 @@ use nalgebra::DMatrix;
 ///
 /// with `H` the sensitivity of the measured signals to the state.
 ///
-/// An effect that reads a position (cogging, a pendulum's weight, a spring) gives the error of the free run many
-/// minima: after some seconds a model that is a little wrong has turned half a cog too far, and each cog has
-/// its own minimum. At the measured positions the effect is a known function of time, and the error has one
-/// minimum. A fit of the free run starts from there. (It is an observer that corrects the positions only; H. D. I. Abarbanel, D. R. Creveling, R. Farsian, M. Kostuk, 2009, "Dynamical state
-/// and parameter estimation", SIAM J. Applied Dynamical Systems 8, 1341–1381, for the idea.)
+/// With an effect that reads a position (cogging, a pendulum's weight, a spring) the error of the free run has
+/// many minima: a model that is a little wrong has turned half a cog too far after some seconds, and each cog
+/// gives a minimum. At the measured positions the effect is a known function of time, and the error has one
+/// minimum. A fit of the free run starts from there.
+///
+/// This is an observer that corrects only the positions. For the idea: H. D. I. Abarbanel, D. R. Creveling,
+/// R. Farsian, M. Kostuk, 2009, "Dynamical state and parameter estimation", SIAM J. Applied Dynamical Systems 8,
+/// 1341–1381.
 #[derive(Clone, Debug)]
 pub(crate) struct Positions {
     /// Corrections by state: its index, and one factor per measured signal.
@@ -29,14 +32,14 @@ pub(crate) struct Positions {
 }
 
 impl Positions {
-    /// Whether an effect reads one.
+    /// Whether an effect reads a position.
     pub(crate) fn matter_to(meta: &EffectMeta) -> bool {
         let position = |role: &Role| matches!(role, Role::Position | Role::Shaft | Role::Heading);
         meta.reads.iter().any(position)
     }
 
-    /// The positions that follow from the measured signals of `model`. None where no position follows, or
-    /// where an effect has memory and would see the position jump.
+    /// The positions that follow from the measured signals of `model`. None where no position does, or where an
+    /// effect has memory: its past would contain jumps.
     pub(crate) fn of(model: &Model, values: &[f64]) -> Option<Self> {
         if model.effects.iter().any(|e| e.meta.memory) {
             return None;

@@ -10,8 +10,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::positions::{Positions, run_with};
 use crate::progress::{Cancelled, Work};
 
-/// Plant states whose initial values are estimated: those that show in the measurements at the beginning of a
-/// run; with an observer, those that it observes. The others start at zero.
+/// Plant states whose initial values are estimated: those that influence the measurements at the beginning of a
+/// run, or with an observer those that it observes. The others start at zero.
 pub(crate) fn estimated_states(model: &Model, values: &[f64], runs: &[Run]) -> Vec<usize> {
     let observer = runs.iter().find_map(|run| run.observer());
     observer.map_or_else(
@@ -28,7 +28,7 @@ pub(crate) struct Sensitivities {
     pub(crate) jacobian: DMatrix<f64>,
 }
 
-/// What a simulation is differentiated by, by index.
+/// The unknowns that a simulation is differentiated by, by index.
 #[derive(Clone, Copy)]
 pub(crate) struct By<'a> {
     pub(crate) parameters: &'a [usize],
@@ -161,7 +161,7 @@ pub(crate) fn signal_rms(
     Ok(squares.iter().map(|s| (s / n.max(1.0)).sqrt()).collect())
 }
 
-/// What a model is simulated with over some runs: what a fit finds.
+/// The values that a fit finds, with which a model is simulated over some runs.
 #[derive(Clone, Debug)]
 pub(crate) struct Solution {
     /// Parameter values of the model.
@@ -193,8 +193,8 @@ impl InitialStates {
 
     /// Those that make the free-run error least, by Gauss–Newton from [`InitialStates::guess`].
     ///
-    /// Only the beginning of a run tells anything about its initial state; two steps are exact to
-    /// rounding where the plant is linear, and a step is taken only if it lowers the error.
+    /// Only the beginning of a run tells anything about its initial state. Where the plant is linear, two steps
+    /// are exact to rounding. A step is taken only if it lowers the error.
     pub(crate) fn estimate(
         model: &Model,
         values: &[f64],
@@ -261,12 +261,12 @@ fn least_squares(jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Option<DVe
     Some(pseudo_inverse(&gram)? * jacobian.tr_mul(residual))
 }
 
-/// Predicts each sample from the one before: the plant state of the free run is corrected by what
-/// was measured, then simulated on for one sampling interval.
+/// Predicts each sample from the one before: the plant state of the free run is corrected by the measurement,
+/// then simulated for one sampling interval.
 ///
-/// The correction is `x + H⁺ (y - ŷ)` with `H` the sensitivity of the measured signals to the
-/// state: for a sensor that reads the state itself, the corrected state is the measurement. Effects
-/// keep their states and memories.
+/// The correction is `x + H⁺ (y - ŷ)` with `H` the sensitivity of the measured signals to the state. For a
+/// sensor that reads the state itself, the corrected state is the measurement. Effects keep their states and
+/// memories.
 pub(crate) fn one_step(
     model: &Model,
     values: &[f64],

@@ -142,7 +142,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Scaled unknowns of parameter values and initial states.
+    /// The scaled unknowns for parameter values and initial states.
     pub(crate) fn pack(&self, values: &[f64], states: &[DVector<f64>]) -> DVector<f64> {
         let mut scaled: Vec<f64> = self
             .free
@@ -158,7 +158,7 @@ impl<'a> Problem<'a> {
         DVector::from_vec(scaled)
     }
 
-    /// What scaled unknowns stand for.
+    /// The solution at scaled unknowns.
     pub(crate) fn solution(&self, scaled: &DVector<f64>) -> Solution {
         let (values, states) = self.unpack(scaled);
         Solution { values, states }
@@ -179,13 +179,13 @@ impl<'a> Problem<'a> {
                 column /= norm;
             }
         }
-        // The same place in other units: there is nothing to be simulated again.
+        // The point is the same in other units: nothing needs to be simulated again.
         self.cache
             .replace(Some((scaled.clone(), residual, jacobian)));
         Ok(scaled)
     }
 
-    /// Parameter values and initial states behind scaled unknowns.
+    /// The parameter values and initial states of scaled unknowns.
     pub(crate) fn unpack(&self, scaled: &DVector<f64>) -> (Vec<f64>, Vec<DVector<f64>>) {
         let mut values = nominal(self.model);
         for (k, i) in self.free.iter().enumerate() {
@@ -255,7 +255,7 @@ impl<'a> Problem<'a> {
         Ok(all)
     }
 
-    /// Keeps the solution of least error, for when the work is cancelled.
+    /// Keeps the solution of least error, in case the work is cancelled.
     fn remember(&self, residual: &DVector<f64>, values: Vec<f64>, states: Vec<DVector<f64>>) {
         let error = residual.norm();
         let mut best = self.best.borrow_mut();
@@ -321,7 +321,7 @@ impl<'a> Problem<'a> {
         Ok((all, jacobian))
     }
 
-    /// The estimated parameters, for what is said of flat directions.
+    /// The estimated parameters, to describe flat directions with.
     pub(crate) fn named(&self) -> Vec<Named<'_>> {
         self.free
             .iter()
@@ -366,7 +366,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// The file's values, defaults where it is silent, zero where there is neither.
+/// The file's values, else the defaults, else zero.
 fn nominal(model: &Model) -> Vec<f64> {
     model
         .parameters
@@ -375,7 +375,7 @@ fn nominal(model: &Model) -> Vec<f64> {
         .collect()
 }
 
-/// The file's values, and where it gives none what the declaration calls a noticeable size.
+/// The file's values, else the noticeable sizes of the declarations.
 pub(crate) fn declared(model: &Model) -> Vec<f64> {
     model
         .parameters

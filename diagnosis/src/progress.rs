@@ -1,4 +1,4 @@
-//! How far long work is, and how to stop it.
+//! Progress of long work, and how to stop it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,7 +16,7 @@ pub enum Stage {
     Comparing,
     /// Fitting the model as it is.
     Fitting,
-    /// Asking of every candidate what one Gauss–Newton step promises.
+    /// Predicting for every candidate what one Gauss–Newton step gains.
     Promises,
     /// Fitting the most promising candidates with a few iterations.
     FirstLooks,
@@ -56,8 +56,8 @@ pub struct Progress {
     pub stage: Stage,
     /// How much of the stage is done: candidates, iterations, samples, runs.
     pub done: u64,
-    /// How much there is to be done in the stage. It may grow while the stage runs, and the stage may
-    /// end before: a fit counts up to its greatest number of iterations.
+    /// How much there is to do in the stage. It may grow while the stage runs. The stage may end before `done`
+    /// reaches it: for a fit it is the greatest number of iterations.
     pub total: u64,
     /// The present error of a fit: that of the free run, relative to the standard deviation.
     pub error: Option<f64>,
@@ -70,18 +70,17 @@ pub struct Progress {
 pub struct CancelToken(Arc<AtomicBool>);
 
 impl CancelToken {
-    /// A token that was not cancelled yet.
+    /// A token that is not cancelled.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Asks the work to stop. It does so within a few samples of a simulation, and returns what it has
-    /// found until then.
+    /// Asks the work to stop. It stops within a few samples of a simulation, and returns what it has found.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was asked to.
+    /// Whether it was cancelled.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
@@ -94,8 +93,7 @@ pub struct Cancelled;
 
 type Report<'a> = &'a (dyn Fn(&Progress) + Sync);
 
-/// Long work, as the caller sees it: whom to tell how far it is, what stops it, and by which criteria it
-/// decides.
+/// How long work is done: who gets its progress, what stops it, and which criteria it decides by.
 ///
 /// ```
 /// use loopsight_diagnosis::{CancelToken, Work};
@@ -135,7 +133,7 @@ impl std::fmt::Debug for Work<'_> {
 }
 
 impl<'a> Work<'a> {
-    /// Work that tells nobody and goes on to its end.
+    /// Work without reports of progress that goes on to its end.
     pub fn quiet() -> Self {
         Self::default()
     }
@@ -162,7 +160,7 @@ impl<'a> Work<'a> {
         self
     }
 
-    /// By what it decides.
+    /// The criteria it decides by.
     pub fn criteria(&self) -> &'a Criteria {
         self.criteria
     }
@@ -172,7 +170,7 @@ impl<'a> Work<'a> {
         self.token.is_cancelled()
     }
 
-    /// A part of the work that tells nobody; the same token stops it.
+    /// A part of the work without reports of progress; the same token stops it.
     pub(crate) fn silently(&self) -> Self {
         Self {
             report: None,
@@ -188,7 +186,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// An error where the work was cancelled. Costs next to nothing: asked at every sample.
+    /// An error where the work was cancelled. It is cheap, because it is called at every sample.
     pub(crate) fn go_on(&self) -> Result<(), Cancelled> {
         if self.is_cancelled() {
             Err(Cancelled)
@@ -197,7 +195,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Says how far a stage is.
+    /// Reports how far a stage is.
     pub(crate) fn tell(&self, stage: Stage, done: u64, total: u64) {
         self.tell_error(stage, done, total, None);
     }

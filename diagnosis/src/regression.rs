@@ -60,8 +60,9 @@ pub(crate) fn for_each_row(
 
 /// Ordinary least squares over all samples: a starting point for a fit that needs one.
 ///
-/// Parameters that are free but enter non-linearly keep the model's value, or have the size of their
-/// declaration; values that the samples do not determine are those of least norm. For `span` see [`for_each_row`].
+/// Parameters that are free but enter non-linearly keep the model's value, or have the typical size of their
+/// declaration. Values that the samples do not determine are those of least norm. For `span` see
+/// [`for_each_row`].
 pub(crate) fn batch(
     model: &Model,
     runs: &[Run],
@@ -98,7 +99,7 @@ pub(crate) fn batch(
         .iter()
         .map(|p| p.value.unwrap_or(0.0))
         .collect();
-    // A parameter that is tied to another one's row is in both: the row that says more of it counts.
+    // A parameter that is tied to another one's row is in both. The row that determines it better counts.
     let mut told = vec![0.0; values.len()];
     for (row, (gram, right)) in grams.iter().enumerate() {
         if let Some(inverse) = pseudo_inverse(gram) {

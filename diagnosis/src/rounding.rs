@@ -33,7 +33,7 @@ impl Problem<'_> {
         self.rounding = rounding;
         self.cache.replace(None);
         let more = self.runs.len() * n_signals;
-        // In units of the first residuals, so that all unknowns are of order one.
+        // `ε` is in units of the residuals of the first pass, so that all unknowns are of order one.
         let scale = residual.norm() / (residual.len() as f64).sqrt();
         self.scales.extend(std::iter::repeat_n(scale, more));
         self.lower = self

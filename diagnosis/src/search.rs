@@ -1,4 +1,4 @@
-//! Which candidates are looked at, and which of them are fitted to the end.
+//! The search among candidates: which get a short fit, and which of these a full one.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -28,19 +28,19 @@ pub(crate) struct Search<'a> {
 /// What a search found.
 #[derive(Default)]
 pub(crate) struct Found {
-    /// The candidates that do best, fitted to the end and explained, the best first.
+    /// The candidates that do best, with their full fits, the best first.
     pub(crate) finalists: Vec<(Judged, Explanation)>,
-    /// Where the work was cancelled: those that were looked at, the best first.
+    /// Where the work was cancelled: those with a short fit, the best first.
     pub(crate) looked: Vec<Judged>,
 }
 
 impl Search<'_> {
     /// The candidates that do best.
     ///
-    /// 1. One Gauss–Newton step for each start of each candidate says what it promises.
-    /// 2. The most promising are fitted with a few iterations: a first look. A candidate that contains another
-    ///    one is looked at from where that one ended.
-    /// 3. The best are fitted to the end.
+    /// 1. *Promise*: for each start of each candidate, the error that one Gauss–Newton step predicts.
+    /// 2. *Look*: the most promising get a fit of a few iterations. A candidate that contains another one starts
+    ///    from where that one ended.
+    /// 3. *Finish*: the best are fitted until they converge.
     pub(crate) fn run(&self) -> Found {
         let looked = self.looked_at();
         if self.work.is_cancelled() {
@@ -58,7 +58,7 @@ impl Search<'_> {
                 let (judged, fit) = finish(first.clone(), self.nominal)?;
                 let explanation = explain(&judged, &fit, self.nominal).ok()?;
                 self.tell(Stage::Finalists, &done, of);
-                // What its own fit brought to nothing explains nothing, however far the others moved.
+                // An effect whose fitted size is nothing explains nothing, whatever the other parameters gained.
                 let least = self.criteria().does_nothing;
                 does_something(&explanation, least).then_some((judged, explanation))
             })
@@ -100,8 +100,8 @@ impl Search<'_> {
         let mut tried: BTreeSet<usize> = first.iter().map(|(i, _)| *i).collect();
         let mut looked = Vec::new();
         self.look_at(&first, waiting.len(), &mut looked);
-        // A candidate that contains another one comes after it, and starts from where that one ended. Where
-        // that one led nowhere it starts from its own best start.
+        // A candidate that contains another one comes after it, and starts from where that one ended. Where that
+        // one failed, it starts from its own best start.
         while !self.work.is_cancelled() {
             let mut next = self.grown(&looked, &tried, &mut waiting, duration);
             next.append(&mut waiting);
@@ -139,7 +139,7 @@ impl Search<'_> {
         promising.into_iter().map(|(_, attempt)| attempt).collect()
     }
 
-    /// Looks at some attempts; so many more are `waiting`.
+    /// Makes the short fits of some attempts; `waiting` more are to come.
     fn look_at(&self, attempts: &[Attempt], waiting: usize, looked: &mut Vec<(usize, Judged)>) {
         let done = AtomicU64::new(looked.len() as u64);
         let of = (looked.len() + attempts.len() + waiting) as u64;
@@ -152,8 +152,8 @@ impl Search<'_> {
         looked.extend(found.collect::<Vec<_>>());
     }
 
-    /// Whether a candidate should start from where another one ended: strong breakaway friction is found from
-    /// dry friction and not from none, and a level for each wheel from one level for both.
+    /// Whether a candidate should start from where another one ended. Strong breakaway friction is found when
+    /// starting from dry friction, not from none; a level for each wheel from one level for both.
     fn grows(&self, i: usize, from: usize) -> bool {
         let (candidate, other) = (&self.all[i], &self.all[from]);
         let contains =
@@ -203,8 +203,8 @@ impl Search<'_> {
     }
 }
 
-/// Whether any parameter that makes an effect large, one that is zero in a neutral effect, is above a share
-/// `least` of its noticeable size.
+/// Whether an effect has any size: a parameter whose neutral value is zero is above the share `least` of its
+/// noticeable size.
 fn does_something(explanation: &Explanation, least: f64) -> bool {
     let model = &explanation.model;
     let place = &explanation.place;
@@ -222,7 +222,7 @@ fn does_something(explanation: &Explanation, least: f64) -> bool {
         })
         .filter(|p| p.free && p.declaration.default == Some(0.0))
         .peekable();
-    // An effect without such a parameter is neutral in another way.
+    // An effect without such a parameter always counts as having a size.
     sizes.peek().is_none() || sizes.any(|p| p.value.is_some_and(|v| v.abs() > least * p.scale()))
 }
 
@@ -258,7 +258,7 @@ fn contest(mut looked: Vec<(usize, Judged)>, criteria: &Criteria) -> Vec<Judged>
         let elsewhere = siblings.first().is_some_and(|best| {
             best.candidate.at != found.candidate.at && error > criteria.elsewhere * best.error()
         });
-        // A special case of one that did well may only need more iterations.
+        // A special case of one that did well may only need more iterations, so it may stay.
         let special = |j: &Judged| is_special(&found.candidate, &j.candidate);
         let best = finalists.first();
         let far = best.is_some_and(|best| error > criteria.behind * best.error())
@@ -276,9 +276,9 @@ fn contest(mut looked: Vec<(usize, Judged)>, criteria: &Criteria) -> Vec<Judged>
     finalists
 }
 
-/// Whether a candidate is needless beside another one that is about as good: a special case of it, the same effect
-/// with common parameters, or the same effect at more channels (on a straight run one wheel looks like both:
-/// then both are meant).
+/// Whether `other` makes a candidate needless where both are about as good: it is a special case of the candidate,
+/// the same effect with common parameters, or the same effect at more channels. (On a straight run an effect at
+/// one wheel looks like one at both; then both are taken.)
 fn spares(other: &Candidate, candidate: &Candidate) -> bool {
     let same = other.meta.id == candidate.meta.id && !other.separate;
     let alike = same && candidate.separate && other.at == candidate.at;

@@ -1,4 +1,4 @@
-//! How a fit is made.
+//! Settings of a fit.
 
 pub use loopsight_model::regression::Scheme;
 use serde::Serialize;
@@ -16,7 +16,7 @@ pub enum Method {
 /// Settings of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitSettings {
-    /// How.
+    /// The method.
     pub method: Method,
     /// The regression of [`Method::Rls`], and of the starting point of [`Method::OutputError`].
     pub scheme: Scheme,

@@ -11,12 +11,12 @@ use crate::prediction::Solution;
 use crate::problem::Problem;
 use crate::progress::{Cancelled, Stage};
 
-/// How hard a fit tries.
+/// When a fit stops.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
     /// Most iterations.
     pub(crate) iterations: u64,
-    /// Relative change of the cost at which it is done.
+    /// Relative change of the cost below which it has converged.
     pub(crate) tolerance: f64,
 }
 
@@ -59,7 +59,7 @@ impl Problem<'_> {
         Ok(self.solve_and_tell(start, effort)?.0)
     }
 
-    /// As [`Problem::solve`], and whether the cost had ceased to fall before the iterations ended.
+    /// As [`Problem::solve`], and whether the cost stopped falling before the iterations ended.
     pub(crate) fn solve_and_tell(
         &self,
         start: &DVector<f64>,
@@ -106,7 +106,7 @@ impl Jacobian for Borrowed<'_, '_> {
     fn jacobian(&self, scaled: &DVector<f64>) -> Result<DMatrix<f64>, Cancelled> {
         Ok(self.residual_and_jacobian(scaled)?.1)
     }
-    /// The simulation that differentiates predicts as well.
+    /// One simulation gives both the prediction and its derivatives.
     fn residual_and_jacobian(
         &self,
         scaled: &DVector<f64>,

@@ -7,7 +7,7 @@ use loopsight_model::model::Model;
 use crate::candidates::Candidate;
 use crate::trial::Judged;
 
-/// Shares of the flow that a speed to be estimated starts from.
+/// Starting values of a speed that is estimated, as shares of the flow.
 const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
 
 /// Starting values of a candidate: those of the `nominal` model. Where the candidate replaces an effect, parameters
@@ -42,8 +42,8 @@ pub(crate) fn grown_starts(
     starts(candidate, &values[..own.start], &known, duration)
 }
 
-/// Starting values of a candidate: `base` for the rest of the model; its own parameters as `known`, else a
-/// noticeable step from neutral.
+/// Starting values of a candidate: `base` for the rest of the model, `known` for its own parameters, and a
+/// noticeable size where these are not known.
 fn starts(
     candidate: &Candidate,
     base: &[f64],
@@ -67,7 +67,7 @@ fn starts(
                 .map(|s| nearest(s * candidate.flow))
                 .collect()
         } else if listed.is_empty() {
-            // Where the position is measured, what is linear in the effect is regressed.
+            // Where the position is measured, the linear parameters are found by regression.
             let neutral_first = regressed && parameter.declaration.linear;
             let step = if neutral_first {
                 0.0

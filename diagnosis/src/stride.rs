@@ -1,4 +1,4 @@
-//! One full Gauss–Newton step: what it promises, and where it leads.
+//! One full Gauss–Newton step: the cost that it predicts, and the values it leads to.
 
 use loopsight_model::model::pseudo_inverse;
 use nalgebra::DVector;

@@ -24,7 +24,7 @@ fn varies(runs: &[Run]) -> bool {
         .any(|r| (0..r.len()).any(|k| first.is_some_and(|first| r.input(k) != first)))
 }
 
-/// What to know of a recording that can: inputs that are constant and not zero, while others vary.
+/// Remarks on a recording that says enough: inputs that are constant and not zero, while others vary.
 pub(crate) fn notes(model: &Model, runs: &[Run]) -> Vec<Advice> {
     let value = |i: usize| {
         let mut values = (runs.iter()).flat_map(move |r| (0..r.len()).map(move |k| r.input(k)[i]));
@@ -47,7 +47,7 @@ pub(crate) fn notes(model: &Model, runs: &[Run]) -> Vec<Advice> {
         .collect()
 }
 
-/// Reasons why not; empty when it can.
+/// Why a recording does not say enough; empty when it does.
 pub(crate) fn reasons(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Vec<Advice> {
     let least = criteria.motion_s;
     let mut list = Vec::new();
@@ -82,7 +82,7 @@ pub(crate) fn reasons(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Ve
         let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
             (a.min(v), b.max(v))
         });
-        // A known influence that happens to be constant is known; an input that is never used teaches nothing.
+        // A constant input that is not zero has a known influence. One that is always zero tells nothing.
         if low >= high && !(low != 0.0 && varies(runs)) {
             say(
                 format!("`{}` is {low} {} all the time", input.id, input.unit),

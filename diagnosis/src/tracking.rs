@@ -24,9 +24,8 @@ const HALF_WINDOW: usize = 3;
 
 /// All steps of `reference` that are at least half a second apart, with their responses.
 ///
-/// A step is a change between two samples of more than a tenth of the largest such change, to a value
-/// that stays: a reference that wanders on by more than 2 % of it was no step.
-/// Overshoot and settling are those of the mean over seven samples.
+/// A step is a change between two samples by more than a tenth of the largest such change. After it the reference
+/// must stay constant to within 2 % of the step. Overshoot and settling are those of the mean over seven samples.
 pub fn step_responses(time: &[f64], reference: &[f64], measured: &[f64]) -> Vec<StepResponse> {
     let n = time.len().min(reference.len()).min(measured.len());
     let change = |k: usize| reference[k] - reference[k - 1];

@@ -1,4 +1,4 @@
-//! One candidate at a time: what it promises, a first look, the full fit.
+//! One candidate at a time: the error it promises, a short fit (the look), the full fit.
 
 use loopsight_model::model::Model;
 use nalgebra::DVector;
@@ -14,7 +14,7 @@ use crate::problem::Problem;
 use crate::progress::Work;
 use crate::solve::Effort;
 
-/// Effort of a first look at a candidate.
+/// Effort of the short fit of a candidate.
 const LOOK: Effort = Effort {
     iterations: 7,
     tolerance: 1e-3,
@@ -24,8 +24,8 @@ pub(crate) const FINAL: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
 };
-/// Longest integration steps of a promise and of a first look, in steps of the plant. Where the effect reads a
-/// position both take the shorter one: a long step would pass over a cog.
+/// Longest integration steps of a promise and of a look, in steps of the plant. Where the effect reads a position
+/// both take the shorter one, because a long step could skip a cog.
 const PROMISE_STEPS: f64 = 4.0;
 const LOOK_STEPS: f64 = 2.0;
 
@@ -34,7 +34,7 @@ const LOOK_STEPS: f64 = 2.0;
 pub(crate) struct Judged {
     pub(crate) candidate: Candidate,
     pub(crate) solution: Solution,
-    /// On what no fit saw.
+    /// On the validation data.
     pub(crate) losses: Losses,
     /// What candidates are ranked by.
     pub(crate) rank: Losses,
@@ -46,8 +46,7 @@ impl Judged {
         nrmse(&self.rank)
     }
 
-    /// Judges the solution of `model`, a candidate's; none where its free run leaves the finite numbers,
-    /// or the work was cancelled.
+    /// Judges the solution of a candidate's `model`; none where its free run diverges or the work was cancelled.
     fn of(
         candidate: Candidate,
         model: &Model,
@@ -66,7 +65,7 @@ impl Judged {
 }
 
 /// The model of a candidate with longer integration steps, and with widely smoothed signs where it begins with a
-/// regression. A file that asks for shorter steps than usual keeps them: its lags need them.
+/// regression. Steps that the file makes shorter than usual stay, because its lags need them.
 fn coarse(candidate: &Candidate, steps: f64) -> Model {
     let mut model = match candidate.shape() {
         Some(_) => candidate.softened(),
@@ -83,12 +82,12 @@ fn coarse(candidate: &Candidate, steps: f64) -> Model {
 pub(crate) struct Nominal<'a> {
     pub(crate) model: &'a Model,
     pub(crate) solution: &'a Solution,
-    /// What it leaves of the cost.
+    /// Its cost.
     pub(crate) cost: f64,
     /// What candidates are ranked by.
     pub(crate) rank: &'a Losses,
     pub(crate) holdout: &'a Holdout<'a>,
-    /// Tells nobody; stops each trial.
+    /// Reports no progress; stops each trial.
     pub(crate) work: &'a Work<'a>,
 }
 
@@ -97,8 +96,8 @@ impl<'a> Nominal<'a> {
         &self.work.criteria().search
     }
 
-    /// The problem of fitting `model` to what a fit may see. Initial states are estimated where they are not
-    /// known. None where the work was cancelled.
+    /// The problem of fitting `model` to the fitting data. Initial states that are not known are estimated. None
+    /// where the work was cancelled.
     fn problem<'m>(&self, model: &'m Model, known: Option<&[DVector<f64>]>) -> Option<Problem<'m>>
     where
         'a: 'm,
@@ -109,7 +108,7 @@ impl<'a> Nominal<'a> {
     }
 }
 
-/// What a candidate promises to leave of the cost, from one start.
+/// The cost that a candidate promises, from one start.
 pub(crate) fn promise(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) -> Option<f64> {
     nominal.work.go_on().ok()?;
     let plain = nominal.cost;
@@ -119,7 +118,7 @@ pub(crate) fn promise(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_
         PROMISE_STEPS
     };
     let mut model = coarse(candidate, steps);
-    // While its linear parameters are neutral, the others have no influence: they need no derivatives.
+    // While its linear parameters are neutral, the others have no influence and need no derivatives.
     let shape = candidate.shape();
     for index in shape.iter().flatten() {
         model.parameters[*index].free = false;
@@ -131,8 +130,8 @@ pub(crate) fn promise(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_
     let (before, after) = problem.promise(start, states).ok()??;
     let criteria = nominal.criteria();
     match shape {
-        // At the measured positions the plain model leaves less as well than in its free run. Where it leaves
-        // hardly anything, the regression says nothing.
+        // At the measured positions the plain model, too, leaves less than in its free run. Where it leaves
+        // hardly anything, the regression tells nothing.
         Some(_) => {
             let promising = after < criteria.promising * before || before < criteria.told * plain;
             promising.then(|| plain * after / before)
@@ -158,8 +157,8 @@ pub(crate) fn look(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) 
     if let Some(measured) = positions(candidate, &start) {
         let mut problem = problem()?;
         problem.positions = Some(measured);
-        // Linear parameters begin where a regression finds them. A ripple of the wrong sign would make the
-        // model stick where the machine does not.
+        // Linear parameters start at the values of a regression. A ripple of the wrong sign would make the model
+        // stick where the machine does not.
         if let Some(shape) = candidate.shape() {
             let regressed = problem.stride(&start, states, &shape).ok()?;
             start = regressed.unwrap_or(start);
@@ -171,11 +170,11 @@ pub(crate) fn look(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) 
 }
 
 /// The full fit of a finalist, initial states included, with intervals. A sign is as sharp as the integrator
-/// allows; where a softer one does better, its width is fitted as well.
+/// allows. Where a softer one does better, its width is fitted as well.
 ///
-/// None where no fit does, or the work was cancelled.
+/// None where every fit fails or the work was cancelled.
 pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
-    // The sharpest that can be.
+    // With the sharpest sign possible.
     let criteria = nominal.criteria();
     let widths = [criteria.sharpest, criteria.sharp];
     let sharp = widths.iter().find_map(|share| {
@@ -197,7 +196,7 @@ pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fi
             let sure = significance(&judged.rank, &soft.0.rank, nominal.work).ok()?;
             (sure > nominal.work.criteria().missing.significant).then_some(soft)
         });
-    // After a cancellation some of these fits are missing, and the best is not known.
+    // After a cancellation some of these fits are missing, so the best is not known.
     nominal.work.go_on().ok()?;
     sharp
         .into_iter()
@@ -206,8 +205,8 @@ pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fi
         .min_by(|a, b| error(a).total_cmp(&error(b)))
 }
 
-/// Fits the width over which the sign is smoothed as well, from where the fit without it ended. Otherwise a
-/// softer sign than usual would be taken for another effect. None where there is no sign.
+/// Fits the smoothing width of the sign as well, from where the fit without it ended. Otherwise an unusually soft
+/// sign would be taken for another effect. None where there is no sign.
 fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     let widths = first.candidate.own_widths();
     widths.first()?;
@@ -215,7 +214,7 @@ fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
         first.candidate.model.parameters[*i].free = true;
     }
     let (mut judged, mut fit) = fully(first, nominal, f64::INFINITY)?;
-    // From here on they are known, as other widths are.
+    // From here on the widths are known parameters, as others are.
     for model in [&mut judged.candidate.model, &mut fit.model] {
         for i in &widths {
             let parameter = &mut model.parameters[*i];
@@ -226,7 +225,7 @@ fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     Some((judged, fit))
 }
 
-/// The full fit. None where its derivatives grow beyond `wild`, or where the effect only sharpens a sign.
+/// The full fit. None where its derivatives exceed `wild`, or where the effect only sharpens a sign.
 fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit)> {
     let model = &first.candidate.model;
     let mut problem = nominal.problem(model, None)?;

@@ -1,4 +1,4 @@
-//! What a recording cannot show is tied to what it does show.
+//! Ties parameters that a recording does not show to those that it shows.
 
 use std::borrow::Cow;
 
@@ -8,9 +8,9 @@ use loopsight_model::run::Run;
 
 use crate::criteria::LogCriteria;
 
-/// `model` with the parts tied that `runs` do not show, as its plant says.
+/// `model`, where the parts that `runs` do not show are tied as its plant declares.
 ///
-/// A parameter with a value of its own in the model file stays: somebody knows better.
+/// A parameter with a value in the model file keeps it.
 pub(crate) fn tied<'m>(model: &'m Model, runs: &[Run], criteria: &LogCriteria) -> Cow<'m, Model> {
     let mut present = Cow::Borrowed(model);
     for part in model.unshown() {
@@ -28,8 +28,8 @@ pub(crate) fn tied<'m>(model: &'m Model, runs: &[Run], criteria: &LogCriteria) -
     present
 }
 
-/// Root mean square of the combination of inputs that shows `part`, over that of its terms: 0 where they
-/// cancel, 1 where they are independent. None without inputs.
+/// Root mean square of the combination of inputs that shows `part`, over that of its terms. It is 0 where the
+/// terms cancel, and 1 where they are independent. None without inputs.
 fn share(model: &Model, part: &Unshown, runs: &[Run]) -> Option<f64> {
     let inputs = model.plant.inputs;
     let terms: Option<Vec<(usize, f64)>> = (part.shown_by.iter())

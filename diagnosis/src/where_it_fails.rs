@@ -16,9 +16,9 @@ use crate::progress::{Cancelled, Work};
 pub struct Statement {
     /// In words.
     pub statement: String,
-    /// Share of the squared error it speaks of.
+    /// Share of the squared error that it explains.
     pub share_of_squared_error: f64,
-    /// The measured signal it speaks of.
+    /// The measured signal it is about.
     #[serde(skip)]
     pub signal: String,
 }
@@ -32,7 +32,7 @@ const MOST: usize = 8;
 #[derive(Default)]
 struct Samples {
     error: Vec<f64>,
-    /// What tells the direction of motion, and below which it counts as rest.
+    /// The quantity whose sign is the direction of motion, and the size below which it counts as rest.
     speed: Vec<f64>,
     rest: f64,
     run: Vec<usize>,
@@ -83,11 +83,11 @@ pub(crate) fn where_it_fails(
     Ok(list)
 }
 
-/// Contiguous parts of a log by which a prediction is tried on samples that did not choose it.
+/// Contiguous parts of a log for cross-validation.
 const PARTS: usize = 16;
 
-/// Whether a quantity of the model predicts the error of a measured signal, on parts of the log that did
-/// not choose the prediction: then that error is no noise.
+/// Whether a quantity of the model predicts the error of a measured signal on held-out parts of the log. Then that
+/// error is not noise.
 pub(crate) fn predictable(
     model: &Model,
     solution: &Solution,
@@ -102,8 +102,8 @@ pub(crate) fn predictable(
     }))
 }
 
-/// Share of the squared error that means over bins of a quantity take away, each learned from the other
-/// half of the parts of the log; negative where they only add to it.
+/// Share of the squared error that means over bins of a quantity explain. The means of each half of the log's
+/// parts come from the other half. Negative where they add to the error.
 fn predicted(values: &[f64], errors: &[f64]) -> f64 {
     let (low, high) = extent(values);
     if high <= low || !(high - low).is_finite() {
@@ -197,7 +197,7 @@ fn collect(
     Ok(all)
 }
 
-/// A statement, and the share of the squared error it speaks of.
+/// A statement, and the share of the squared error that it explains.
 type Said = (String, f64);
 
 fn share(samples: &Samples, pick: impl Fn(usize) -> bool) -> (f64, f64) {
@@ -351,7 +351,7 @@ mod tests {
         let law: Vec<f64> = values.iter().map(|v| 0.3 * v.signum() + noise()).collect();
         let share = predicted(&values, &law);
         assert!((share - 0.09 / (0.09 + 1.0 / 12.0)).abs() < 0.05, "{share}");
-        // What happened in one half only is predicted by nothing.
+        // An error in only one half cannot be predicted from the other.
         let drift: Vec<f64> = (0..3000).map(f64::from).collect();
         assert!(predicted(&drift, &white) < 0.02);
     }

@@ -43,7 +43,7 @@ pub enum Promise {
 pub struct Considered {
     /// What it is.
     pub experiment: String,
-    /// As [`Plan::detectability`], after 20 s (or the duration asked for).
+    /// As [`Plan::detectability`], for 20 s (or the duration asked for).
     pub detectability: f64,
 }
 
@@ -60,8 +60,8 @@ pub struct Plan {
     pub separates: Vec<EffectAt>,
     /// The parameters it pins.
     pub pins: Vec<String>,
-    /// Effects: their distance in standard deviations. Parameters: value (or noticeable change, if
-    /// larger or the value is zero) over the predicted standard error.
+    /// Effects: their distance in standard deviations. Parameters: the value over the predicted standard error;
+    /// a noticeable change takes the place of a smaller value.
     pub detectability: f64,
     /// What it promises.
     pub verdict: Promise,

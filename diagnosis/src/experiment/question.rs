@@ -1,4 +1,4 @@
-//! What is asked: effects and parameters by name, and models that have them at a noticeable size.
+//! The question of an experiment: effects and parameters by name, and models with them at a noticeable size.
 
 use loopsight_core::{EffectMeta, Place};
 use loopsight_model::config::nearest;
@@ -90,7 +90,7 @@ pub enum QuestionError {
         "the model is unstable: no input planned beforehand keeps it from running away; record it in its loop, with a reference that jumps and something added to the command"
     )]
     Unstable,
-    /// A limit that is none.
+    /// A number out of its range.
     #[error("the {what} is {found} {unit}, expected {expected}")]
     Number {
         /// Which number.
@@ -117,8 +117,8 @@ fn hint(near: Option<&str>, otherwise: &str) -> String {
     )
 }
 
-/// An effect as typed: `dead_zone`, at the channels where a diagnosis would try it first, or
-/// `dead_zone@input.right+input.left`.
+/// Reads an effect as typed: `dead_zone@input.right+input.left`, or `dead_zone` for the channels where a
+/// diagnosis would try it first.
 ///
 /// # Errors
 ///
@@ -241,7 +241,7 @@ pub(super) fn check(model: &Model, limits: &ExperimentLimits) -> Result<(), Ques
     Ok(())
 }
 
-/// A model that is taken to be the robot, with its values, and another with the starts of its fit.
+/// A model that is taken as true, with its values, and a rival with the starts of its fit.
 pub(super) struct Direction {
     pub(super) truth: (Model, Vec<f64>),
     pub(super) rival: (Model, Vec<Vec<f64>>),
@@ -281,8 +281,8 @@ pub(super) fn rivals(
         return Err(QuestionError::Same(a.effect.clone()));
     }
     let second = with(b)?;
-    // What contains the other as a special case can always follow it: there the question is only
-    // whether it has to be the larger one.
+    // An effect that contains the other one can always follow it. Then the only question is whether the larger
+    // one is needed.
     let contains = |one: &Side, other: &Side| {
         one.meta.simpler.contains(&other.meta.id) && one.place.at == other.place.at
     };
@@ -315,7 +315,7 @@ impl Rivals {
         }
     }
 
-    /// Why not, and what would.
+    /// Why no inputs separate them, and what would.
     pub(super) fn inseparable(&self, share: f64) -> String {
         let ids: Vec<&str> = self.places.iter().map(|p| p.effect.as_str()).collect();
         let either = |part: &str| ids.iter().any(|id| id.contains(part));
@@ -349,7 +349,7 @@ impl Rivals {
 const STARTS: usize = 5;
 /// Share of the flow that a speed of an effect is taken to be.
 const SPEED: f64 = 0.1;
-/// Share of the limit below which a threshold of an input must lie to be met at all.
+/// A threshold of an input is assumed to lie below this share of the limit, so that the input reaches it.
 const MET: f64 = 0.7;
 
 /// One of the two.

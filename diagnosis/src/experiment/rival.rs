@@ -1,4 +1,4 @@
-//! How far a rival stays from the truth after it did its best.
+//! How far a rival model stays from the true one after it was fitted to it.
 
 use loopsight_model::model::{Model, pseudo_inverse};
 use loopsight_model::run::{Rows, Run};
@@ -204,7 +204,7 @@ pub(crate) fn standard_errors(information: &Information, flat: f64) -> Vec<f64> 
 fn weigh(mut residual: DVector<f64>, noise: &[f64]) -> DVector<f64> {
     for (k, value) in residual.iter_mut().enumerate() {
         *value /= noise[k % noise.len()];
-        // A rival that left the finite numbers explains nothing, but must not poison a sum.
+        // A rival that diverged explains nothing, but must not make a sum infinite.
         if !value.is_finite() {
             *value = 1e9;
         }

@@ -5,12 +5,16 @@
 //! u_i(t) = 0                otherwise
 //! ```
 //!
-//! Seven shapes: fast and slow binary sequences (all frequencies, one amplitude), many and small
-//! levels (amplitudes), slow ramps through zero with rests (thresholds, breakaway), steps with
-//! coasting (transients, friction without drive), a chirp (frequencies one after the other). With
-//! several inputs each of them comes four times: every input its own, all equal (a straight run of
-//! a vehicle), in turns opposite (a turn on the spot), and the last two in alternation. All seeds
-//! are fixed.
+//! Seven shapes, and what each is for:
+//!
+//! * fast and slow binary sequences: all frequencies, one amplitude;
+//! * many and small levels: amplitudes;
+//! * slow ramps through zero with rests: thresholds, breakaway;
+//! * steps with coasting: transients, friction without drive;
+//! * a chirp: frequencies one after the other.
+//!
+//! With several inputs each shape comes four times: every input its own, all equal (a vehicle drives
+//! straight), in turns opposite (it turns on the spot), and the last two in alternation. All seeds are fixed.
 //!
 //! Reference: L. Ljung (1999), "System Identification: Theory for the User", 2nd edition, section
 //! 13.3.
@@ -20,7 +24,7 @@ use loopsight_model::registry::BuildError;
 
 use crate::experiment::Drive;
 
-/// Without command at the beginning and at the end, s.
+/// Time without command at the beginning and at the end, s.
 const REST: f64 = 0.5;
 
 /// Length of the straight runs and of the turns of an alternation, s: whole steps and levels.
@@ -86,7 +90,7 @@ impl Shape {
             .collect()
     }
 
-    /// The plain pseudo-random binary sequence that everybody records first.
+    /// The pseudo-random binary sequence that is usually recorded first.
     pub(crate) fn usual(inputs: usize) -> Shape {
         Shape {
             kind: Kind::SlowBinary,

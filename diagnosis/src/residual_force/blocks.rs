@@ -1,4 +1,4 @@
-//! Least squares that are judged on blocks of time which they did not see.
+//! Least squares, cross-validated on blocks of time.
 
 use loopsight_model::run::Run;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -17,7 +17,7 @@ const FOLDS: usize = 4;
 pub(super) struct Blocks {
     gram: Vec<DMatrix<f64>>,
     right: Vec<DVector<f64>>,
-    /// Sum of squares of what is to be explained.
+    /// Sum of squares of the values to explain.
     square: Vec<f64>,
     /// Number of residuals.
     rows: f64,
@@ -43,8 +43,8 @@ fn blocks(runs: &[Run]) -> (Vec<usize>, usize) {
 }
 
 impl Blocks {
-    /// Columns of the same meaning, or of no sample where a fit may look, stay near zero: `ridge` is
-    /// the weight of that, as a share of each column's own square.
+    /// `ridge` is the weight of staying at zero, as a share of each column's own square. It keeps the coefficients
+    /// small of columns that are dependent, or zero in the fitting data.
     pub(super) fn new(
         responses: &Responses,
         runs: &[Run],
@@ -79,7 +79,7 @@ impl Blocks {
         Ok(blocks)
     }
 
-    /// Sum of squares of what is to be explained.
+    /// Sum of squares of the values to explain.
     pub(super) fn total(&self) -> f64 {
         self.square.iter().sum()
     }
@@ -105,7 +105,7 @@ impl Blocks {
                 }
             }
         }
-        // Columns of one size, as all blocks have it.
+        // Columns are scaled to one size, taken over all blocks.
         let scale = DVector::from_fn(n, |i, _| {
             let of = (columns[i], columns[i]);
             let square: f64 = self.gram.iter().map(|g| g[of]).sum();
@@ -169,8 +169,8 @@ impl Blocks {
     }
 }
 
-/// By how much the second of two series of losses is less, in all and in standard errors of that
-/// sum.
+/// By how much the second of two series of losses is less: the sum of the differences, and that sum in standard
+/// errors.
 pub(super) fn gain(before: &[f64], after: &[f64]) -> (f64, f64) {
     let n = before.len().min(after.len());
     let differences: Vec<f64> = before.iter().zip(after).map(|(a, b)| a - b).collect();

@@ -1,4 +1,4 @@
-//! What a force depends on: its mean over each quantity, and how much of it that is.
+//! What a force depends on: its mean over each quantity, and the share of its variance that this explains.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +20,7 @@ const BINS: usize = 16;
 /// Share of the samples beyond either end of the bins.
 const TAIL: f64 = 0.01;
 
-/// Weight of a mean of zero, as a share of what all samples of a bin say.
+/// Weight of a mean of zero, as a share of the weight of all samples of a bin.
 const RIDGE: f64 = 1e-3;
 
 /// How a force depends on one quantity.
@@ -30,12 +30,11 @@ pub struct ForceDependence {
     pub quantity: String,
     /// Its unit.
     pub unit: String,
-    /// Where the quantity is an angle that makes turns: one turn, to which it is reduced.
+    /// One turn, where the quantity is an angle that makes turns. The angle is reduced to it.
     pub period: Option<f64>,
-    /// Share of the force's variance that its mean over the quantity accounts for, on blocks of time
-    /// that the mean was not taken from: chance gives nothing.
+    /// Share of the force's variance that its mean over the quantity accounts for, on held-out blocks of time.
     pub share_of_variance: f64,
-    /// The mean force over the quantity: one curve for either direction of motion, or one for all.
+    /// The mean force over the quantity: one curve for each direction of motion, or one for all.
     pub curves: Vec<ForceCurve>,
 }
 
@@ -48,7 +47,7 @@ pub struct ForceCurve {
     pub bins: Vec<ForceBin>,
 }
 
-/// A stretch of a quantity.
+/// An interval of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ForceBin {
     /// Mean of the quantity.
@@ -69,7 +68,7 @@ pub(super) struct Followed<'a> {
     pub(super) solution: &'a Solution,
     pub(super) runs: &'a [Run],
     pub(super) filtered: &'a [Filtered],
-    /// White innovations that a force should explain, and the squares that noise makes of them.
+    /// White innovations that a force should explain, and the sum of squares that noise alone would give.
     pub(super) innovations: &'a nalgebra::DVector<f64>,
     pub(super) noise: f64,
 }

@@ -26,13 +26,13 @@ pub(super) struct Filtered {
     /// Correction by what the measurement says beyond the prediction, by sample: of the plant's
     /// state, then of the rounding of the counts.
     pub(super) gains: Vec<DMatrix<f64>>,
-    /// What makes the innovations of a sample white, by sample.
+    /// The matrix that makes the innovations of a sample white, by sample.
     pub(super) whiteners: Vec<DMatrix<f64>>,
     /// White innovations, sample by sample, signal by signal.
     pub(super) innovations: Vec<f64>,
     /// All signals of the plant in the middle of the interval that ends with each sample.
     pub(super) signals: Vec<Vec<f64>>,
-    /// Squares of the innovations that the noise of the sensors alone would make.
+    /// Sum of squares of the innovations that the noise of the sensors alone would give.
     pub(super) noise: f64,
     likelihood: f64,
 }
@@ -47,19 +47,18 @@ impl Filtered {
     }
 }
 
-/// An extended Kalman filter whose unknown is a force: between two samples each effort (where the
-/// plant has none, each input) is off by a constant, of a size that is found by maximum likelihood.
-/// Returns one filtered run per run.
+/// An extended Kalman filter whose unknown is a force. Between two samples each effort has an unknown constant
+/// added to it, or each input where the plant has no efforts. The size of that constant is found by maximum
+/// likelihood. Returns one filtered run per run.
 ///
 /// ```text
 /// [x; y]⁻ = F(x) ≈ A x + B w      P⁻ = A P Aᵀ + B Q Bᵀ      S = P⁻_yy + R
 /// x⁺ = x⁻ + K (y - y⁻)            K = P⁻_xy S⁻¹              P⁺ = P⁻_xx - K S Kᵀ
 /// ```
 ///
-/// `y⁻` is what the sensors would read, which for a mean depends on the whole interval. What was
-/// rounded off a count comes back in the next difference, so the state has it, too. Effects keep
-/// their own states and memories. `A` and `B` are those of the plant alone: they decide about
-/// the gain only, and a gain need not be perfect.
+/// `y⁻` is what the sensors would read, which for a mean depends on the whole interval. What was rounded off a
+/// count comes back in the next difference, so the state contains it too. Effects keep their own states and
+/// memories. `A` and `B` are those of the plant alone: they determine only the gain, which need not be exact.
 ///
 /// Reference: A. H. Jazwinski (1970), "Stochastic Processes and Filtering Theory", section 8.3;
 /// the likelihood is that of the innovations, F. C. Schweppe (1965), IEEE Trans. Information Theory
@@ -260,8 +259,8 @@ fn filtered(
         let ab = linear.step(simulator.state(), until, run.input(k - 1));
         simulator.advance(until, run.input(k - 1));
         simulator.measure(&mut outputs);
-        // Before the measurement corrects it: what a force is said to depend on must not know the
-        // residual that it is to explain.
+        // Taken before the measurement corrects the state: the quantities that explain a residual must not depend
+        // on that residual.
         let mut middle: Vec<f64> = simulator
             .signals()
             .iter()
@@ -278,7 +277,7 @@ fn filtered(
         b.view_mut((0, 0), (nx, q.ncols()))
             .copy_from(&ab.view((0, nx), (nx, q.ncols())));
         for i in 0..ny {
-            // Nothing is learnt from a sample that is not there.
+            // A missing sample corrects nothing.
             if run.sample(k)[i].is_finite() {
                 a.view_mut((nz + i, 0), (1, nx))
                     .copy_from(&ab.view((nx + i, 0), (1, nx)));
@@ -319,7 +318,7 @@ fn filtered(
         out.innovations.extend(white.iter());
         out.signals.push(middle);
     }
-    // What the filter did not get to counts nothing.
+    // Samples that the filter did not reach count nothing.
     for _ in out.gains.len()..run.len() {
         out.pass(nx, ny, vec![0.0; n_signals]);
     }

@@ -1,5 +1,5 @@
-//! The force that is missing where no effect of the library is it: what it depends on, and an
-//! expression to begin with.
+//! The missing force, where no effect of the library explains it: what it depends on, and a first expression for
+//! it.
 
 mod blocks;
 mod dependence;
@@ -30,10 +30,10 @@ use response::{Column, responses};
 use select::{Chosen, select};
 use words::{statement, written};
 
-/// Most samples that are looked at: what a force depends on shows in fewer.
+/// Most samples that are used: they are enough to show what a force depends on.
 const MOST_SAMPLES: usize = 30_000;
-/// Weight of a coefficient of zero, as a share of what the samples say: enough for terms that the
-/// parameters can be.
+/// Weight of a coefficient of zero, as a share of the weight of the samples. It decides where terms and the
+/// model's own parameters do the same.
 const RIDGE: f64 = 1e-7;
 /// A force that would make the model agree with the measurements.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -46,7 +46,7 @@ pub struct ResidualForce {
     pub statement: String,
     /// Quantities it depends on, the most telling first.
     pub depends_on: Vec<ForceDependence>,
-    /// An expression to begin with; `null` where none stands out from the noise.
+    /// A first expression; `null` where no term stands out from the noise.
     pub expression: Option<ForceExpression>,
 }
 
@@ -55,8 +55,7 @@ pub struct ResidualForce {
 pub struct ForceExpression {
     /// The expression with its numbers.
     pub force: String,
-    /// Share of the residual force's variance that it accounts for, on blocks of time that its
-    /// numbers were not found from.
+    /// Share of the residual force's variance that it accounts for, on held-out blocks of time.
     pub share_of_variance: f64,
     /// `[[effect]]` entries for the model file.
     pub toml: String,
@@ -64,14 +63,12 @@ pub struct ForceExpression {
 
 /// What force is missing from the fitted `model`.
 ///
-/// The model follows the measurements through a filter whose only unknown is a force; what the
-/// measurements say beyond the prediction is compared, sample by sample, with what each of many forces would
-/// change there; the model's own parameters may change as well. That is a linear regression of white residuals
-/// on exact derivatives, in the units of the forces. No measurement is differentiated, and nothing has to be
-/// known at an instant. Terms and shares are judged on blocks of time that no coefficient was found from, so
-/// that chance explains nothing.
+/// A filter whose only unknown is a force makes the model follow the measurements. Its white innovations are
+/// regressed on the exact derivatives by many possible forces and by the model's own parameters. The coefficients
+/// have the units of the forces, and no measurement is differentiated. Terms and shares are judged on held-out
+/// blocks of time, so chance explains nothing.
 ///
-/// `None` where the plant offers no place for a force, or noise explains what there is.
+/// `None` where the plant has no channel for a force, or noise explains the innovations.
 ///
 /// # Errors
 ///
@@ -153,7 +150,7 @@ pub(crate) fn of_solution(
     }
     let Some(found) = best else { return Ok(None) };
     let (bending, numbers) = found.numbers.split_at(known.len());
-    // The missing force is what the model's own parameters, at their best, leave unexplained.
+    // The missing force is what the model's own parameters cannot explain, at their best values.
     let mut innovations = bent.innovations.clone();
     if !numbers.is_empty() {
         innovations -= &bent.columns * DVector::from_column_slice(bending);
@@ -202,8 +199,7 @@ pub(crate) fn of_solution(
     }))
 }
 
-/// The coefficients of `columns`. Those that are no more than noise become zero, as one half of a wave may, but not
-/// the first `known`.
+/// The coefficients of `columns`. Those within the noise become zero, except for the first `known`.
 fn sure(blocks: &Blocks, known: usize, columns: Vec<usize>, sure: f64) -> Option<Vec<f64>> {
     let all = blocks.solve(&columns)?;
     let stays: Vec<usize> = (0..columns.len())
@@ -222,9 +218,9 @@ struct Found {
     group: Group,
     way: Way,
     chosen: Chosen,
-    /// Of the known parameters, by how much they bend; then those of the terms.
+    /// The changes of the known parameters, then the coefficients of the terms.
     numbers: Vec<f64>,
-    /// Sum of squares left on blocks that the numbers were not found from.
+    /// Sum of squares left on held-out blocks.
     left: f64,
 }
 

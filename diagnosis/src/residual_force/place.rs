@@ -121,7 +121,7 @@ impl Group {
         for to in &mut series {
             to.push(times.clone());
         }
-        // What never changes, or is nothing, is no reason for a force.
+        // A force cannot depend on a quantity that never changes.
         let useful: Vec<bool> = (0..quantities.len())
             .map(|q| {
                 series.iter().any(|s| {
@@ -195,8 +195,8 @@ impl Group {
         all
     }
 
-    /// The columns `known`, those of [`Group::columns`], and where there are several channels
-    /// those of forces that act alike at all.
+    /// The columns `known`, then those of [`Group::columns`], then, if there are several channels, those of the
+    /// same force at all of them.
     pub(super) fn joined(&self, known: &Responses, forces: &Responses) -> Responses {
         let (rows, n_known) = known.columns.shape();
         let per_channel = self.shapes().count();

@@ -12,7 +12,7 @@ use super::filter::{Filtered, innovation};
 use crate::prediction::Solution;
 use crate::progress::{Cancelled, Work};
 
-/// Something that could be different, by one unit.
+/// A force or a parameter that could be different by one unit.
 #[derive(Clone, Debug)]
 pub(super) enum Column {
     /// A force at some places, by sample: constant over the interval that ends with it.
@@ -21,12 +21,12 @@ pub(super) enum Column {
     Parameter(usize),
 }
 
-/// White innovations of all runs and what one unit of each column changes them by, with the model
-/// following the filter's corrections: exact derivatives of the filtered simulation, effects with
-/// their states and memories included. One row per sample and signal.
+/// White innovations of all runs, and their changes by one unit of each column. These are exact derivatives of
+/// the simulation as corrected by the filter, including the states and memories of effects. One row per sample
+/// and signal.
 pub(super) struct Responses {
     pub(super) innovations: DVector<f64>,
-    /// By column: what the model predicts more.
+    /// By column: the change of the prediction.
     pub(super) columns: DMatrix<f64>,
 }
 

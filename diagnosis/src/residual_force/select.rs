@@ -8,7 +8,7 @@ use crate::progress::{Cancelled, Work};
 pub(super) struct Choice {
     /// Its columns.
     pub(super) columns: Vec<usize>,
-    /// How intricate it is.
+    /// Its complexity.
     pub(super) complexity: usize,
 }
 
@@ -17,15 +17,14 @@ pub(super) struct Choice {
 pub(super) struct Chosen {
     /// Indices among the choices.
     pub(super) terms: Vec<usize>,
-    /// Sum of squares that they take off blocks they were not fitted to, beyond what the known
-    /// parameters can.
+    /// By how much they reduce the sum of squares on held-out blocks, beyond what the known parameters can.
     pub(super) explained: f64,
-    /// How intricate they are together.
+    /// Their complexity together.
     pub(super) complexity: usize,
 }
 
-/// Chooses terms for as long as one more pays on unseen blocks, then drops those that later ones
-/// made needless. The columns `known` may always bend: they are the model's own parameters.
+/// Chooses terms while one more helps on held-out blocks, then drops those that later ones made needless. The
+/// columns `known` always take part: they are the model's own parameters.
 pub(super) fn select(
     blocks: &Blocks,
     known: &[usize],
@@ -43,7 +42,8 @@ pub(super) fn select(
     };
     let plain = blocks.unseen(known);
     let base: f64 = plain.iter().sum();
-    // White residuals: a coefficient's square in standard errors is what it takes off.
+    // With white residuals of variance 1 a term reduces the sum of squares by the square of its coefficient in
+    // standard errors.
     let worth = (criteria.worth * (base - noise)).max(certain * certain);
     let mut terms: Vec<usize> = Vec::new();
     let mut losses = plain.clone();

@@ -13,7 +13,7 @@ pub(super) enum Variable {
     Time,
 }
 
-/// One thing to multiply a coefficient with.
+/// A term without its coefficient.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Shape {
     One,
@@ -148,8 +148,7 @@ const WIDTHS: [f64; 3] = [0.05, 0.2, 0.6];
 /// Terms that are chosen together: a wave has a cosine and a sine.
 pub(super) type Term = Vec<Shape>;
 
-/// Everything that may be a term of a force that depends on `quantities`, the simple before the
-/// intricate.
+/// All possible terms of a force that depends on `quantities`, simple ones first.
 pub(super) fn terms(quantities: &[Quantity]) -> Vec<Term> {
     let mut all: Vec<Term> = vec![vec![Shape::One]];
     let of = |role: Role| {
@@ -160,7 +159,7 @@ pub(super) fn terms(quantities: &[Quantity]) -> Vec<Term> {
     for q in quantities {
         let x = q.variable;
         let mut singles = vec![Shape::Is(x), Shape::Magnitude(x)];
-        // Nothing signed about time, and the sign of where an axis stands is nothing special.
+        // The sign of a time, or of an angle that makes turns, means nothing.
         if x != Variable::Time && !q.turns {
             singles.extend(WIDTHS.map(|w| Shape::Direction(x, w * q.rms)));
             singles.extend([

@@ -20,7 +20,7 @@ fn both(names: &[String]) -> String {
     }
 }
 
-/// What the force depends on; shares below `telling` are not worth a word.
+/// What the force depends on; shares below `telling` are left out.
 pub(super) fn statement(
     at: &[String],
     depends_on: &[ForceDependence],
