@@ -148,22 +148,19 @@ impl State {
             _ => match fit(&self.present, measurements, &settings, &work.silently()) {
                 Err(FitError::Cancelled(Cancelled)) => (None, Conclusion::Cancelled),
                 Ok(fit) if fit.cancelled => (Some(fit), Conclusion::Cancelled),
-                done => (Some(done?), verdict),
+                Err(error) => return Err(error),
+                Ok(fit) => match self.tell_open(&fit.model, measurements, work) {
+                    Err(FitError::Cancelled(Cancelled)) => (Some(fit), Conclusion::Cancelled),
+                    Err(error) => return Err(error),
+                    Ok(()) => (Some(fit), verdict),
+                },
             },
         };
-        let (best, verdict) = match (best, verdict) {
-            (Some(best), verdict) if verdict != Conclusion::Cancelled => {
-                match self.tell_open(&best.model, measurements, work) {
-                    Err(FitError::Cancelled(Cancelled)) => (Some(best), Conclusion::Cancelled),
-                    done => (done.map(|()| Some(best))?, verdict),
-                }
+        let best = match verdict {
+            Conclusion::Cancelled => {
+                best.or_else(|| self.steps.last().map(|step| unfitted(self.present, step)))
             }
-            (best, Conclusion::Cancelled) => {
-                let last = || self.steps.last();
-                let best = best.or_else(|| last().map(|s| unfitted(self.present.clone(), s)));
-                (best, Conclusion::Cancelled)
-            }
-            refused => refused,
+            _ => best,
         };
         Ok(Improvement {
             steps: self.steps,

@@ -128,12 +128,12 @@ pub(crate) fn still_open(
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<Vec<Vec<EffectAt>>, FitError> {
-    let candidates: Vec<(usize, &EffectAt, Model)> = steps
+    let candidates: Vec<((usize, &EffectAt), Model)> = steps
         .iter()
         .enumerate()
         .filter_map(|(index, step)| Some((index, step.added.as_ref()?, twins(step, diagnoses))))
         .flat_map(|(index, place, twins)| twins.into_iter().map(move |twin| (index, place, twin)))
-        .filter_map(|(index, place, twin)| Some((index, twin, exchanged(model, place, twin)?)))
+        .filter_map(|(index, place, twin)| Some(((index, twin), exchanged(model, place, twin)?)))
         .collect();
     let mut open = vec![Vec::new(); steps.len()];
     if candidates.is_empty() {
@@ -141,14 +141,8 @@ pub(crate) fn still_open(
     }
     let silent = work.silently();
     let bar = refitted(model, measurements, &silent)?.0 / work.criteria().improve.better;
-    let as_good: Vec<bool> = candidates
-        .par_iter()
-        .map(|(_, _, model)| refitted(model, measurements, &silent).is_ok_and(|(e, _)| e <= bar))
-        .collect();
-    // After a cancellation some were not tried.
-    work.go_on()?;
-    for ((index, twin, _), _) in candidates.iter().zip(as_good).filter(|(_, good)| *good) {
-        open[*index].push((*twin).clone());
+    for ((index, twin), ..) in no_worse(candidates, bar, measurements, &silent)? {
+        open[index].push(twin.clone());
     }
     Ok(open)
 }
@@ -211,21 +205,12 @@ impl Refined<'_> {
         self.changes += candidates.len() as u64;
         self.work.tell(Stage::Refining, self.changes, self.changes);
         let silent = self.work.silently();
-        let refitted = |model: &Model| refitted(model, self.measurements, &silent);
         let now = match self.error {
             Some(now) => now,
-            None => refitted(self.model)?.0,
+            None => refitted(self.model, self.measurements, &silent)?.0,
         };
         self.error = Some(now);
-        let fitted: Vec<(T, f64, Model)> = candidates
-            .into_par_iter()
-            .filter_map(|(what, model)| {
-                let (error, model) = refitted(&model).ok()?;
-                (error <= share * now).then_some((what, error, model))
-            })
-            .collect();
-        // After a cancellation some changes were not tried, and the best is not known.
-        self.work.go_on()?;
+        let fitted = no_worse(candidates, share * now, self.measurements, &silent)?;
         let best = fitted.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
         Ok(best.map(|(what, error, model)| {
             *self.model = model;
@@ -244,6 +229,26 @@ fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
     (0..model.effects.len())
         .filter(|index| of_place(&model.effects[*index]))
         .collect()
+}
+
+/// The `candidates` that a short fit brings to an error of at most `bar`, fitted, in their order. Those that cannot be
+/// fitted, because their free run diverges, are not among them.
+fn no_worse<T: Send>(
+    candidates: Vec<(T, Model)>,
+    bar: f64,
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<Vec<(T, f64, Model)>, FitError> {
+    let fitted = candidates
+        .into_par_iter()
+        .filter_map(|(what, model)| {
+            let (error, model) = refitted(&model, measurements, work).ok()?;
+            (error <= bar).then_some((what, error, model))
+        })
+        .collect();
+    // After a cancellation some were not tried.
+    work.go_on()?;
+    Ok(fitted)
 }
 
 /// Iterations of a short fit.

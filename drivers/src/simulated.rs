@@ -186,6 +186,10 @@ impl DriverPart for Simulated {
         }))
     }
 
+    fn simulates_with(&self) -> Option<f64> {
+        Some(self.longest_step())
+    }
+
     fn is_simulated(&self) -> bool {
         true
     }

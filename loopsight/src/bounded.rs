@@ -43,10 +43,11 @@ pub(crate) fn log(name: &str, model: &Composed, runs: &[Run]) -> Result<()> {
     Ok(())
 }
 
-/// What is wrong with a simulated robot that runs for `duration_s` with steps of `step_s`, if anything.
+/// What is wrong with a simulated robot that runs for `duration_s` with steps of `step_s`, if anything; a step that is
+/// not above zero is refused elsewhere.
 pub(crate) fn robot(duration_s: f64, step_s: f64) -> Option<String> {
     let steps = duration_s / step_s;
-    (steps > MOST_OF_ROBOT).then(|| {
+    (step_s > 0.0 && steps > MOST_OF_ROBOT).then(|| {
         format!(
             "{duration_s} s are {steps:.1e} integration steps of the simulated robot's {step_s} s, expected at \
              most {MOST_OF_ROBOT:e}: give a shorter time, or the robot a longer `step_s`"

@@ -91,7 +91,7 @@ impl Written {
             return Err(source.error(&["period_s".into()], &message, None));
         }
         let step = experiment.robot.longest_step();
-        if let Some(message) = bounded::robot(experiment.duration_s, step).filter(|_| step > 0.0) {
+        if let Some(message) = bounded::robot(experiment.duration_s, step) {
             return Err(source.error(&["duration_s".into()], &message, None));
         }
         if experiment.robot.model.is_some() {

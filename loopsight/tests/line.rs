@@ -62,6 +62,15 @@ fn write(folder: &Path, name: &str, text: &str, line: &Path) {
     std::fs::write(folder.join(name), text).unwrap();
 }
 
+/// Waits until the door of a run is open, at most five seconds.
+fn wait_for(door: &Path) {
+    let opened = (0..1000).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        door.exists()
+    });
+    assert!(opened);
+}
+
 /// The log of a robot at a serial port goes straight into a diagnosis, which finds what its model lacks.
 #[test]
 fn the_log_of_a_robot_at_a_serial_port_is_diagnosed() {
@@ -136,11 +145,7 @@ fn what_is_not_declared_changeable_is_refused_at_the_door() {
     write(folder.path(), "faster.toml", &faster, &line);
     std::thread::scope(|scope| {
         let run = scope.spawn(|| said(folder.path(), &["run", "loop.toml"]));
-        let opened = (0..1000).any(|_| {
-            std::thread::sleep(std::time::Duration::from_millis(5));
-            door.exists()
-        });
-        assert!(opened);
+        wait_for(&door);
         let output = loopsight(folder.path(), &["send", "faster.toml"]);
         let complaint = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(1), "{complaint}");
@@ -227,11 +232,7 @@ fn a_robot_that_drives_is_sent_a_better_model() {
     );
     let run = std::thread::scope(|scope| {
         let run = scope.spawn(|| said(folder.path(), &["run", "loop.toml"]));
-        let opened = (0..1000).any(|_| {
-            std::thread::sleep(std::time::Duration::from_millis(5));
-            door.exists()
-        });
-        assert!(opened);
+        wait_for(&door);
         let text = said(folder.path(), &["send", "better_loop.toml"]);
         let first = format!(
             "the robot at {} (ddmr, every 0.01 s) drives on with it\n",

@@ -20,7 +20,6 @@ pub(crate) fn table(model: &Composed, log: &Source) -> Option<String> {
     let mut filling = Filling {
         inventory: log.inventory(),
         map: model.log.clone(),
-        taken: Vec::new(),
         guesses: Vec::new(),
     };
     let mut trial = model.clone();
@@ -41,7 +40,6 @@ pub(crate) fn table(model: &Composed, log: &Source) -> Option<String> {
 struct Filling {
     inventory: Inventory,
     map: LogMap,
-    taken: Vec<String>,
     guesses: Vec<String>,
 }
 
@@ -113,7 +111,6 @@ impl Filling {
     }
 
     fn put(&mut self, signal: &Signal, channel: &ChannelFacts) {
-        self.taken.push(channel.path.clone());
         let old = self.map.measured.remove(signal.id).unwrap_or_default();
         let measured = Measured {
             column: Some(channel.path.clone()),
@@ -132,8 +129,7 @@ impl Filling {
             .values()
             .filter_map(|m| m.column.as_deref());
         let time = self.map.time.iter().map(ColumnMap::name);
-        let named = inputs.chain(measured).chain(time);
-        named.chain(self.taken.iter().map(String::as_str)).collect()
+        inputs.chain(measured).chain(time).collect()
     }
 
     /// The channel for a signal: by words and unit, by a name that is nearly the one that was looked for, or
@@ -174,7 +170,6 @@ impl Filling {
                 (channel.clone(), Some(guess))
             }
         };
-        self.taken.push(channel.path.clone());
         self.guesses.extend(guess);
         Some(channel)
     }

@@ -1,9 +1,7 @@
 //! A loop file: what a loop is composed of.
 
-use std::any::Any;
 use std::path::{Path, PathBuf};
 
-use loopsight_drivers::Simulated;
 use loopsight_model::config::{TomlSource, read_text};
 use loopsight_model::loop_file::{Composed, LoopFile};
 use loopsight_model::model::Model as ComposedModel;
@@ -111,11 +109,9 @@ impl Loop {
             let message = format!("that is {ticks:.1e} ticks, expected at most {MOST_TICKS:e}");
             return Err(source.error(&["duration_s".into()], &message, None).into());
         }
-        let driver: &dyn Any = file.driver.as_ref();
-        if let (Some(simulated), Some(duration)) =
-            (driver.downcast_ref::<Simulated>(), file.duration_s)
-            && let Some(message) = bounded::robot(duration, simulated.longest_step())
-                .filter(|_| !file.real_time && simulated.longest_step() > 0.0)
+        let simulated = file.driver.simulates_with().zip(file.duration_s);
+        if let Some((step, duration)) = simulated.filter(|_| !file.real_time)
+            && let Some(message) = bounded::robot(duration, step)
         {
             return Err(source.error(&["duration_s".into()], &message, None).into());
         }

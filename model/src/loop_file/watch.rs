@@ -43,19 +43,18 @@ impl LoopFile {
                 learning: true,
                 assumed: Some(OF_LEARNING),
             }),
-            None => Some(Watch {
-                settings: SupervisorSettings {
-                    // A robot that keeps the time itself also knows when it has heard nothing for too long.
-                    stale_s: if self.driver.runs_law() {
-                        f64::INFINITY
-                    } else {
-                        SupervisorSettings::of_any(self.period_s).stale_s
-                    },
-                    ..SupervisorSettings::of_any(self.period_s)
-                },
-                learning: false,
-                assumed: Some(OF_ANY),
-            }),
+            None => {
+                let mut settings = SupervisorSettings::of_any(self.period_s);
+                // A robot that keeps the time itself also knows when it has heard nothing for too long.
+                if self.driver.runs_law() {
+                    settings.stale_s = f64::INFINITY;
+                }
+                Some(Watch {
+                    settings,
+                    learning: false,
+                    assumed: Some(OF_ANY),
+                })
+            }
         }
     }
 

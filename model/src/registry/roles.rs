@@ -111,6 +111,10 @@ pub trait DriverPart: Debug + Send + Sync + Any {
     fn is_driven(&self) -> bool {
         true
     }
+    /// Longest integration step of the robot that it simulates, s; none where it simulates none.
+    fn simulates_with(&self) -> Option<f64> {
+        None
+    }
     /// True where its settings say how large the inputs get that it takes.
     fn is_limited(&self) -> bool {
         false
