@@ -3,7 +3,7 @@
 //! `[effect.expression]` and `[plant.expression]` are read here; how they are written is told in
 //! `docs/own-in-toml.md`. Behind the registry such a part is like any other: a declaration with
 //! parameters, and equations for any scalar. The text of an expression becomes a tree
-//! (with exmex, which knows the precedence) and then a flat program that allocates nothing.
+//! and then a flat program that allocates nothing.
 
 mod at_channels;
 mod channels;

@@ -1,14 +1,13 @@
 //! From the text of an expression to its tree.
 //!
-//! exmex knows which operator binds more tightly; it knows no places. So the words are checked
-//! here, one behind the other, where a mistake can still be pointed at. What is handed over is
-//! right and has every operand by its number: `{0} * {1}`.
+//! The words are checked here, one behind the other, where a mistake can still be pointed at. Which
+//! operator binds more tightly is the business of `precedence`.
 
 use std::ops::Range;
 
 use super::lexer::{Word, words};
-use super::operation::{CONSTANTS, FUNCTIONS, Function, constant, function};
-use super::precedence::evaluate;
+use super::operation::{Binary, CONSTANTS, FUNCTIONS, Function, constant, function};
+use super::precedence::Stacks;
 use super::program::MOST_LEAVES;
 use super::tree::Tree;
 use super::{ExpressionError, Names};
@@ -22,14 +21,10 @@ pub(crate) fn parse(text: &str, names: &dyn Names) -> Result<Tree, ExpressionErr
     let mut reader = Reader {
         text,
         names,
-        operands: Vec::new(),
-        written: String::new(),
+        stacks: Stacks::default(),
         open: vec![Level::default()],
         sign: false,
-        operator: None,
     };
-    // A sign is `0 - x` that binds tighter than a product.
-    reader.operands.push(Tree::Number(0.0));
     let words = words(text)?;
     let mut wanted = Wanted::Operand;
     for (i, (word, place)) in words.iter().enumerate() {
@@ -40,15 +35,14 @@ pub(crate) fn parse(text: &str, names: &dyn Names) -> Result<Tree, ExpressionErr
                 if let Some(level) = reader.level() {
                     level.place = place.clone();
                 }
-                reader.written.push_str("( ");
                 Wanted::Operand
             }
             Wanted::Operator => reader.operator(*word, place)?,
         };
     }
     reader.end(wanted)?;
-    let tree = evaluate(&reader.written, &reader.operands)
-        .map_err(|why| ExpressionError::at(0..text.len(), format!("cannot be read: {why}")))?;
+    let tree = reader.stacks.finish();
+    let tree = tree.ok_or_else(|| ExpressionError::at(0..text.len(), "there is no expression"))?;
     if tree.has_bad_number() {
         let message = "a part of this without names is not a finite number";
         return Err(ExpressionError::at(0..text.len(), message));
@@ -80,7 +74,7 @@ struct Level {
     place: Range<usize>,
     /// The function called, and how many commas are still to come.
     call: Option<(&'static str, usize)>,
-    /// A comma is an operator in exmex: two more parentheses keep its sides together.
+    /// The function takes two arguments.
     two: bool,
     /// There is a power among the last factors.
     power: bool,
@@ -89,13 +83,10 @@ struct Level {
 struct Reader<'t> {
     text: &'t str,
     names: &'t dyn Names,
-    operands: Vec<Tree>,
-    written: String,
+    stacks: Stacks,
     open: Vec<Level>,
     /// The last word was a sign.
     sign: bool,
-    /// The last word, when it was an operator.
-    operator: Option<char>,
 }
 
 impl Reader<'_> {
@@ -104,11 +95,8 @@ impl Reader<'_> {
     }
 
     fn push(&mut self, tree: Tree) -> Wanted {
-        let written = format!("{{{}}} ", self.operands.len());
-        self.written.push_str(&written);
-        self.operands.push(tree);
+        self.stacks.operand(tree);
         self.sign = false;
-        self.operator = None;
         Wanted::Operator
     }
 
@@ -122,7 +110,7 @@ impl Reader<'_> {
             Word::Number(x) => Ok(self.push(Tree::Number(x))),
             Word::Name(name) => self.name(name, place, called),
             Word::Open => {
-                self.nest(place, None, false)?;
+                self.nest(place, None)?;
                 Ok(Wanted::Operand)
             }
             Word::Operator('-' | '+') if self.sign => {
@@ -130,13 +118,7 @@ impl Reader<'_> {
                 Err(error.help("one of them is enough, or parentheses around the inner one"))
             }
             Word::Operator('-') => {
-                // In an exponent the sign belongs to the operator: `2^-x`.
-                if self.operator == Some('^') {
-                    self.written.truncate(self.written.trim_end().len());
-                    self.written.push_str("- ");
-                } else {
-                    self.written.push_str("{0} ~ ");
-                }
+                self.stacks.sign();
                 self.sign = true;
                 Ok(Wanted::Operand)
             }
@@ -166,12 +148,10 @@ impl Reader<'_> {
         if called {
             let entry = FUNCTIONS.iter().find(|(n, _)| *n == name);
             return match entry {
-                Some((name, Function::One(_))) => {
-                    self.written.push_str(name);
-                    self.written.push(' ');
-                    self.call(name, 0, place)
+                Some((name, function)) => {
+                    self.nest(place, Some((name, *function)))?;
+                    Ok(Wanted::Open)
                 }
-                Some((name, Function::Two(_))) => self.call(name, 1, place),
                 None if known.is_some() => {
                     let message = format!("`{name}` is no function");
                     let help = format!("a product is written `{name} * (…)`");
@@ -206,38 +186,26 @@ impl Reader<'_> {
         }
     }
 
-    fn call(
-        &mut self,
-        name: &'static str,
-        commas: usize,
-        place: &Range<usize>,
-    ) -> Result<Wanted, ExpressionError> {
-        self.nest(place, Some((name, commas)), commas > 0)?;
-        Ok(Wanted::Open)
-    }
-
-    /// Opens a parenthesis; that of a call is written when it comes.
+    /// Opens a parenthesis, with the function it belongs to.
     fn nest(
         &mut self,
         place: &Range<usize>,
-        call: Option<(&'static str, usize)>,
-        two: bool,
+        call: Option<(&'static str, Function)>,
     ) -> Result<(), ExpressionError> {
         if self.open.len() > DEEPEST {
             let message = format!("more than {DEEPEST} parentheses within each other");
             return Err(ExpressionError::at(place.clone(), message));
         }
-        if two || call.is_none() {
-            self.written.push_str("( ");
-        }
+        let function = call.map(|(_, function)| function);
+        self.stacks.open(function);
+        let two = matches!(function, Some(Function::Two(_)));
         self.open.push(Level {
             place: place.clone(),
-            call,
+            call: call.map(|(name, _)| (name, usize::from(two))),
             two,
             power: false,
         });
         self.sign = false;
-        self.operator = None;
         Ok(())
     }
 
@@ -259,9 +227,13 @@ impl Reader<'_> {
                     );
                 }
                 level.power = c == '^';
-                self.operator = Some(c);
-                self.written.push(c);
-                self.written.push(' ');
+                self.stacks.operator(match c {
+                    '+' => Binary::Add,
+                    '-' => Binary::Subtract,
+                    '*' => Binary::Multiply,
+                    '/' => Binary::Divide,
+                    _ => Binary::Power,
+                });
                 Ok(Wanted::Operand)
             }
             Word::Close => {
@@ -274,7 +246,7 @@ impl Reader<'_> {
                 if let Some((name, 1)) = level.call {
                     return wrong(format!("`{name}` takes two arguments, found one"));
                 }
-                self.written.push_str(if level.two { ") ) " } else { ") " });
+                self.stacks.close();
                 Ok(Wanted::Operator)
             }
             Word::Comma => {
@@ -285,9 +257,7 @@ impl Reader<'_> {
                 match level.call {
                     Some((name, 1)) => {
                         level.call = Some((name, 0));
-                        self.written.push_str(") ");
-                        self.written.push_str(name);
-                        self.written.push_str(" ( ");
+                        self.stacks.comma();
                         Ok(Wanted::Operand)
                     }
                     Some((name, _)) => {

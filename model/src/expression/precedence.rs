@@ -1,66 +1,109 @@
-//! Which operator binds more tightly: exmex, computing with trees.
+//! Which operator binds more tightly: two stacks, as E. W. Dijkstra's shunting yard has them
+//! (Algol-60 translation, Mathematisch Centrum MR 34/61, 1961).
+//!
+//! Sums bind loosest, then products, then a sign, then a power: `-x^2` is `-(x^2)`. Operators of one
+//! strength go from left to right. The words come checked: an operand where one belongs, an
+//! operator where one belongs.
 
-use exmex::{BinOp, Express, FlatEx, MakeOperators, Operator};
-
-use super::operation::{Binary, Unary};
+use super::operation::{Binary, Function, Unary};
 use super::tree::Tree;
 
-/// The operators of an expression, for exmex.
-#[derive(Clone, Debug)]
-struct Operators;
-
-macro_rules! binary {
-    ($text:literal, $prio:literal, $operation:expr) => {
-        Operator::make_bin(
-            $text,
-            BinOp {
-                apply: $operation,
-                prio: $prio,
-                is_commutative: false,
-            },
-        )
-    };
+/// What waits for its last operand.
+#[derive(Clone, Copy)]
+enum Waiting {
+    /// A minus in front of its operand.
+    Sign,
+    Operator(Binary),
+    /// An open parenthesis, and the function it belongs to.
+    Open(Option<Function>),
 }
 
-macro_rules! calls {
-    ($($text:literal: $operation:ident),*) => {
-        vec![$(Operator::make_unary($text, |x| Tree::one(Unary::$operation, x))),*]
-    };
-}
-
-impl MakeOperators<Tree> for Operators {
-    fn make<'a>() -> Vec<Operator<'a, Tree>> {
-        let mut all = calls![
-            "abs": Abs, "sign": Sign, "sqrt": Sqrt, "exp": Exp, "ln": Ln, "sin": Sin, "cos": Cos,
-            "tan": Tan, "asin": Asin, "acos": Acos, "atan": Atan, "sinh": Sinh, "cosh": Cosh,
-            "tanh": Tanh
-        ];
-        all.extend([
-            binary!("+", 1, |a, b| Tree::two(Binary::Add, a, b)),
-            binary!("-", 1, |a, b| Tree::two(Binary::Subtract, a, b)),
-            binary!("*", 2, |a, b| Tree::two(Binary::Multiply, a, b)),
-            binary!("/", 2, |a, b| Tree::two(Binary::Divide, a, b)),
-            binary!("~", 3, |_, b| Tree::one(Unary::Negate, b)),
-            binary!("^", 4, |a, b| Tree::two(Binary::Power, a, b)),
-            binary!("^-", 4, |a, b| {
-                Tree::two(Binary::Power, a, Tree::one(Unary::Negate, b))
-            }),
-            binary!("min", 5, |a, b| Tree::two(Binary::Min, a, b)),
-            binary!("max", 5, |a, b| Tree::two(Binary::Max, a, b)),
-            binary!("atan2", 5, |a, b| Tree::two(Binary::Atan2, a, b)),
-        ]);
-        all
+impl Waiting {
+    /// How tightly it binds; nothing passes an open parenthesis.
+    fn strength(self) -> u8 {
+        match self {
+            Waiting::Open(_) => 0,
+            Waiting::Operator(Binary::Add | Binary::Subtract) => 1,
+            Waiting::Operator(Binary::Multiply | Binary::Divide) => 2,
+            Waiting::Sign => 3,
+            Waiting::Operator(_) => 4,
+        }
     }
 }
 
-/// What exmex makes of an expression whose operands are numbered.
-pub(super) fn evaluate(written: &str, operands: &[Tree]) -> Result<Tree, String> {
-    let expression = FlatEx::<Tree, Operators>::parse(written).map_err(|e| e.msg().to_owned())?;
-    let values: Option<Vec<Tree>> = expression
-        .var_names()
-        .iter()
-        .map(|name| operands.get(name.parse::<usize>().ok()?).cloned())
-        .collect();
-    let values = values.ok_or("an operand is missing")?;
-    expression.eval(&values).map_err(|e| e.msg().to_owned())
+/// An expression that is read from left to right.
+#[derive(Default)]
+pub(super) struct Stacks {
+    operands: Vec<Tree>,
+    waiting: Vec<Waiting>,
+}
+
+impl Stacks {
+    /// A number or a name.
+    pub(super) fn operand(&mut self, tree: Tree) {
+        self.operands.push(tree);
+    }
+
+    /// A minus in front of an operand.
+    pub(super) fn sign(&mut self) {
+        self.waiting.push(Waiting::Sign);
+    }
+
+    /// An operator between two operands.
+    pub(super) fn operator(&mut self, operator: Binary) {
+        let waiting = Waiting::Operator(operator);
+        self.settle(waiting.strength());
+        self.waiting.push(waiting);
+    }
+
+    /// An opening parenthesis, of a function or of none.
+    pub(super) fn open(&mut self, function: Option<Function>) {
+        self.waiting.push(Waiting::Open(function));
+    }
+
+    /// The comma between the arguments of a function: the first one is complete.
+    pub(super) fn comma(&mut self) {
+        self.settle(1);
+    }
+
+    /// A closing parenthesis.
+    pub(super) fn close(&mut self) {
+        self.settle(1);
+        if let Some(Waiting::Open(function)) = self.waiting.pop() {
+            match function {
+                None => {}
+                Some(Function::One(operation)) => self.one(operation),
+                Some(Function::Two(operation)) => self.two(operation),
+            }
+        }
+    }
+
+    /// The expression, when all of it was read.
+    pub(super) fn finish(mut self) -> Option<Tree> {
+        self.settle(1);
+        self.operands.pop()
+    }
+
+    /// Completes what waits and binds at least as tightly.
+    fn settle(&mut self, strength: u8) {
+        while let Some(last) = self.waiting.pop_if(|last| last.strength() >= strength) {
+            match last {
+                Waiting::Sign => self.one(Unary::Negate),
+                Waiting::Operator(operation) => self.two(operation),
+                Waiting::Open(_) => {}
+            }
+        }
+    }
+
+    fn one(&mut self, operation: Unary) {
+        if let Some(x) = self.operands.pop() {
+            self.operands.push(Tree::one(operation, x));
+        }
+    }
+
+    fn two(&mut self, operation: Binary) {
+        if let (Some(b), Some(a)) = (self.operands.pop(), self.operands.pop()) {
+            self.operands.push(Tree::two(operation, a, b));
+        }
+    }
 }

@@ -1,8 +1,6 @@
 //! An expression as it was understood.
 
 use std::collections::BTreeSet;
-use std::convert::Infallible;
-use std::str::FromStr;
 
 use super::operation::{Binary, Unary};
 
@@ -138,18 +136,10 @@ impl Dependence {
     }
 }
 
-/// What exmex asks of a type it computes with.
+/// The number zero.
 impl Default for Tree {
     fn default() -> Self {
         Tree::Number(0.0)
-    }
-}
-
-/// What exmex asks of a type it computes with; numbers are read elsewhere.
-impl FromStr for Tree {
-    type Err = Infallible;
-    fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(Tree::Number(text.parse().unwrap_or(f64::NAN)))
     }
 }
 
