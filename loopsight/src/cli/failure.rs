@@ -1,6 +1,8 @@
 //! What goes wrong, shown to a person once.
 
-use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource};
+use std::ops::Range;
+
+use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 
 use crate::error::Error;
 
@@ -8,37 +10,70 @@ use crate::error::Error;
 pub(crate) fn print(error: &Error) {
     let text = placed(error).unwrap_or_else(|| {
         let help = error.help();
-        let help = help.map_or_else(String::new, |help| match help.contains('\n') {
+        let help = help.map_or_else(String::new, |help| {
             // What can be pasted stands on lines of its own.
-            true => format!("\n{help}"),
-            false => format!(" ({help})"),
+            if help.contains('\n') {
+                format!("\n{help}")
+            } else {
+                format!(" ({help})")
+            }
         });
         format!("error: {}{help}", error.message())
     });
     eprintln!("{}", text.trim_end());
 }
 
-/// The text with the place of the mistake.
+/// The text with the place of the mistake, and a line before and behind it.
 fn placed(error: &Error) -> Option<String> {
     let (file, (text, span)) = (error.file()?, error.excerpt()?);
-    let label = LabeledSpan::new_with_span(None, span);
-    let mut diagnostic = MietteDiagnostic::new(error.message().to_owned()).with_label(label);
+    let (lines, first) = around(text, &span)?;
+    let at = span.start - lines.start..span.end.min(lines.end) - lines.start;
+    let shown = &text[lines];
+    let snippet = Snippet::source(shown)
+        .path(file)
+        .line_start(first)
+        .annotation(AnnotationKind::Visible.span(0..shown.len()))
+        .annotation(AnnotationKind::Primary.span(at));
+    let mut report = Level::ERROR.primary_title(error.message()).element(snippet);
     if let Some(help) = error.help() {
-        diagnostic = diagnostic.with_help(help);
+        report = report.element(Level::HELP.message(help));
     }
-    let report =
-        miette::Report::new(diagnostic).with_source_code(NamedSource::new(file, text.to_owned()));
     let colours = std::io::IsTerminal::is_terminal(&std::io::stderr())
         && std::env::var_os("NO_COLOR").is_none();
-    let theme = if colours {
-        GraphicalTheme::unicode()
+    let renderer = if colours {
+        Renderer::styled()
     } else {
-        GraphicalTheme::unicode_nocolor()
+        Renderer::plain()
     };
-    let mut shown = String::new();
-    let handler = GraphicalReportHandler::new_themed(theme).with_context_lines(1);
-    match handler.render_report(&mut shown, report.as_ref()) {
-        Ok(()) => Some(shown),
-        Err(_) => Some(format!("{file}: {}", error.message())),
+    let width = console::Term::stderr().size().1.max(40);
+    Some(renderer.term_width(width.into()).render(&[report]))
+}
+
+/// The lines of `span`, one before and one behind, in bytes, and the number of the first of them.
+fn around(text: &str, span: &Range<usize>) -> Option<(Range<usize>, usize)> {
+    let (before, behind) = (text.get(..span.start)?, text.get(span.end..)?);
+    let mut ends = before.rmatch_indices('\n').map(|(at, _)| at + 1);
+    let start = ends.by_ref().nth(1).unwrap_or(0);
+    let end = behind.match_indices('\n').nth(1);
+    let end = end.map_or(text.len(), |(at, _)| span.end + at);
+    Some((start..end, 1 + text[..start].matches('\n').count()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mistake_is_shown_with_its_neighbours() {
+        let text = "one\ntwo\nthree\nfour\nfive\n";
+        let lines = |word: &str| {
+            let at = text.find(word).unwrap_or(0);
+            let (lines, first) = around(text, &(at..at + word.len())).unwrap_or_default();
+            (&text[lines], first)
+        };
+        assert_eq!(lines("one"), ("one\ntwo", 1));
+        assert_eq!(lines("three"), ("two\nthree\nfour", 2));
+        assert_eq!(lines("five"), ("four\nfive\n", 4));
+        assert!(around(text, &(30..31)).is_none());
     }
 }
