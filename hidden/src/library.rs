@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use loopsight_recordings::{RecordingError, output};
+
 use crate::error::HiddenError;
 use crate::truth::Concealed;
 use crate::{Experiment, Hidden, Recording, Robot, catalogue, nrmse, overall, record, refit};
@@ -130,7 +132,8 @@ fn write_index(path: &Path, index: &str) -> Result<(), HiddenError> {
 }
 
 fn write(path: &Path, text: &str) -> Result<(), HiddenError> {
-    fs::write(path, text).map_err(|e| io(path, e))
+    output::save(path, text.as_bytes()).map_err(RecordingError::from)?;
+    Ok(())
 }
 
 fn io(path: &Path, source: std::io::Error) -> HiddenError {

@@ -11,6 +11,7 @@ use loopsight_model::config::TomlSource;
 use loopsight_model::loop_file::LoopFile;
 
 use crate::error::{Error, Result};
+use crate::files::Reads;
 use crate::run::Loop;
 use crate::watch::CancelToken;
 use crate::words::number;
@@ -47,7 +48,7 @@ pub(crate) fn bring_up(
         )));
     }
     let model = control.model()?.composed;
-    let composed = control.compose(&model)?;
+    let composed = control.compose(&model, &Reads::default())?;
     let ids: Vec<&str> = model.plant.inputs.iter().map(|s| s.id).collect();
     let limits = ids.iter().map(|id| limit_of(&source, file, id));
     let limits: Vec<f64> = limits.collect::<Result<_>>()?;

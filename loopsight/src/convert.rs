@@ -35,7 +35,7 @@ impl Session {
                 )));
             }
         };
-        files::writable(path)?;
+        files::check(path)?;
         let several = data.runs.len() > 1;
         let mut columns = vec!["time_s".to_owned()];
         columns.extend(several.then(|| "run".to_owned()));
@@ -52,15 +52,16 @@ impl Session {
             begin += run.duration() + PAUSE;
         }
         let wrong = |error| Error::in_log(&error, &path.display().to_string(), None);
-        if mcap {
+        let written = if mcap {
             let mut log = LogWriter::create(path, &columns).map_err(wrong)?;
             for row in rows.chunks_exact(columns.len()) {
                 log.write(row).map_err(wrong)?;
             }
-            log.finish().map_err(wrong)?;
+            log.finish()
         } else {
-            write_csv(path, &columns, &rows).map_err(wrong)?;
-        }
+            write_csv(path, &columns, &rows)
+        };
+        let written = written.map_err(wrong)?;
         let samples = rows.len() / columns.len();
         let duration_s = data.runs.iter().map(|run| run.duration()).sum();
         Ok(ConvertAnswer {
@@ -78,6 +79,7 @@ impl Session {
             samples,
             duration_s,
             columns,
+            written,
         })
     }
 }

@@ -8,7 +8,7 @@ use loopsight_model::config::{ConfigError, ReadError};
 use loopsight_model::model::ModelError;
 use loopsight_model::registry::RegistryError;
 use loopsight_recordings::RecordingError;
-use loopsight_report::ReportError;
+use loopsight_recordings::output::OutputError;
 
 /// The result of everything in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -133,7 +133,7 @@ impl Error {
     /// An error in a log; `text` is the log as text, where it is at hand.
     pub(crate) fn in_log(error: &RecordingError, file: &str, text: Option<&str>) -> Self {
         // A disk that is full is nobody's mistake in the request.
-        let written = matches!(error, RecordingError::Io { action, .. } if *action == "write");
+        let written = matches!(error, RecordingError::Output(error) if !error.is_request());
         let mut this = if written {
             Self::work(error.to_string())
         } else {
@@ -250,10 +250,13 @@ impl From<RegistryError> for Error {
     }
 }
 
-/// Whether the place can be written is looked at before the work; what goes wrong then is no mistake in the request.
-impl From<ReportError> for Error {
-    fn from(error: ReportError) -> Self {
-        Self::work(error.to_string())
+impl From<OutputError> for Error {
+    fn from(error: OutputError) -> Self {
+        if error.is_request() {
+            Self::request(error.to_string())
+        } else {
+            Self::work(error.to_string())
+        }
     }
 }
 

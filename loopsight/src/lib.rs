@@ -129,6 +129,7 @@ pub use improve::ImproveOptions;
 pub use inspect::{InspectOptions, inspect};
 pub use list::{ListOptions, PartRole, list};
 pub use log::{Log, LogBuilder};
+pub use loopsight_recordings::output::Written;
 pub use model::{Model, ModelValue};
 pub use run::{ControlledNow, InputNow, LogTo, Loop, ParameterNow, RunOptions, RunView};
 #[cfg(feature = "serial")]

@@ -5,6 +5,7 @@ mod memory;
 use std::ops::Range;
 use std::path::Path;
 
+use loopsight_recordings::output::Written;
 use loopsight_recordings::{RecordingError, Source, Table};
 
 use crate::error::{Error, Result};
@@ -223,7 +224,7 @@ impl Log {
     /// # Errors
     ///
     /// The file cannot be written.
-    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<Written> {
         let path = path.as_ref();
         let table = self.source.table();
         let mut headers = self.columns();

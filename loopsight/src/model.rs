@@ -5,6 +5,7 @@ use std::path::Path;
 use loopsight_model::config::{TomlSource, nearest, read_text};
 use loopsight_model::model::{Model as Composed, ModelParameter};
 use loopsight_model::registry;
+use loopsight_recordings::output::Written;
 
 use crate::error::{Error, Result};
 use crate::files;
@@ -186,7 +187,7 @@ impl Model {
     /// # Errors
     ///
     /// The file cannot be written.
-    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<Written> {
         files::save(path.as_ref(), &self.text)
     }
 

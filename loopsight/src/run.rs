@@ -14,7 +14,7 @@ use loopsight_recordings::LogWriter;
 
 use crate::answers::RunAnswer;
 use crate::error::{Error, Result};
-use crate::files;
+use crate::files::{self, Reads};
 use crate::session::Session;
 use crate::watch::{Watch, watched};
 
@@ -34,6 +34,8 @@ pub struct RunOptions {
     pub watch: Watch,
     /// Who cancels, for the sentence that says so: by default `its caller`.
     pub stopped_by: Option<String>,
+    /// Files that will be written of the answer: an error if the loop reads one of them, before it runs.
+    pub pages: Vec<PathBuf>,
     on_tick: Option<Arc<OnTick>>,
 }
 
@@ -62,6 +64,7 @@ impl fmt::Debug for RunOptions {
             .field("series", &self.series)
             .field("watch", &self.watch)
             .field("stopped_by", &self.stopped_by)
+            .field("pages", &self.pages)
             .finish_non_exhaustive()
     }
 }
@@ -85,6 +88,13 @@ impl RunOptions {
     #[must_use]
     pub fn stopped_by(mut self, who: &str) -> Self {
         self.stopped_by = Some(who.to_owned());
+        self
+    }
+
+    /// Files that will be written of the answer: an error if the loop reads one of them, before it runs.
+    #[must_use]
+    pub fn pages<P: Into<PathBuf>>(mut self, pages: impl IntoIterator<Item = P>) -> Self {
+        self.pages.extend(pages.into_iter().map(Into::into));
         self
     }
 
@@ -118,16 +128,19 @@ impl Session {
     pub fn run(&self, control: &Loop, options: &RunOptions) -> Result<RunAnswer> {
         let model = &self.model.composed;
         let file = &control.parsed;
-        let mut composed = control.compose(model)?;
+        let reads = Reads::default();
+        reads.note(control.file().to_owned());
+        reads.note(control.model_file());
+        let mut composed = control.compose(model, &reads)?;
         let log_path = match &options.log {
             LogTo::AsWritten => file.log.as_ref().map(|log| control.beside(log)),
             LogTo::File(path) => Some(path.clone()),
             LogTo::Nowhere => None,
         };
         if let Some(path) = &log_path {
-            files::writable(path)?;
-            files::apart(path, [control.file(), &control.model_file()])?;
+            files::check(path)?;
         }
+        reads.apart(log_path.iter().chain(&options.pages).map(PathBuf::as_path))?;
         // The timer of a robot that runs the law itself is not the host's to measure.
         let real_time = (file.real_time || !file.driver.is_simulated()) && !file.driver.runs_law();
         let mut recorder = Recorder::new(model, &composed, file.period_s, real_time);

@@ -16,6 +16,7 @@ use crate::answers::{ExperimentAnswer, SimulateAnswer};
 use crate::bounded;
 use crate::columns;
 use crate::error::{Error, Result};
+use crate::files::Reads;
 use crate::log::Log;
 use crate::session::Session;
 
@@ -166,8 +167,8 @@ impl Experiment {
         self.written.period_s
     }
 
-    /// Runs the experiment on the robot `model`.
-    pub(crate) fn simulate(&self, model: &Composed) -> Result<Run> {
+    /// Runs the experiment on the robot `model`; `reads` gets the files that this reads.
+    pub(crate) fn simulate(&self, model: &Composed, reads: &Reads) -> Result<Run> {
         let source = TomlSource::parse(&self.file, &self.text)?;
         let written = &self.written;
         let steps = (written.duration_s / written.period_s + 1e-9).floor() as usize;
@@ -181,11 +182,12 @@ impl Experiment {
                 let message = "the plan was made for a plant with other inputs";
                 return Err(Error::request(message));
             }
-            (None, Some(name)) => replayed(&source, name, model, &time)?,
+            (None, Some(name)) => replayed(&source, name, model, &time, reads)?,
             (None, None) => {
                 let beside = Path::new(&source.file);
-                let read =
-                    |name: &str, column: &str| columns::read(&beside.with_file_name(name), column);
+                let read = |name: &str, column: &str| {
+                    columns::read(&reads.note(beside.with_file_name(name)), column)
+                };
                 let inputs = excitation::build_with(&written.inputs, model.plant.inputs, &read)
                     .map_err(|e| placed(&source, &["inputs".into()], e))?;
                 sample_rows(&inputs, &time)
@@ -237,8 +239,9 @@ fn replayed(
     name: &str,
     model: &Composed,
     time: &[f64],
+    reads: &Reads,
 ) -> std::result::Result<Vec<f64>, Box<ConfigError>> {
-    let path = Path::new(&source.file).with_file_name(name);
+    let path = reads.note(Path::new(&source.file).with_file_name(name));
     let wrong = |why: String| {
         let why = format!("{}: {why}", path.display());
         source.error(&["inputs_from".into()], &why, None)
@@ -302,9 +305,10 @@ impl Session {
                 self.model.file,
             )));
         }
-        let run = options.experiment.simulate(model)?;
+        let reads = Reads::default();
+        let run = options.experiment.simulate(model, &reads)?;
         let log = Log::of_table(table(model, &run));
-        Ok(SimulateAnswer::new(&run, log))
+        Ok(SimulateAnswer::new(&run, log, reads.all()))
     }
 }
 

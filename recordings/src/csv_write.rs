@@ -5,7 +5,7 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use loopsight_core::Signal;
@@ -13,6 +13,7 @@ use loopsight_core::unit::parse;
 
 use crate::error::RecordingError;
 use crate::mcap_log::McapLog;
+use crate::output::{Growing, OutputError, OutputFile, Written};
 use crate::sync::Syncer;
 
 /// The column of a signal: `linear_velocity` in `m/s` is `linear_velocity_m_per_s`.
@@ -63,8 +64,8 @@ pub fn column(id: &str, unit: &str) -> String {
 ///
 /// # Errors
 ///
-/// [`RecordingError::Io`], and [`RecordingError::RowWidth`] when `rows` is no whole number of rows.
-pub fn write_csv(path: &Path, headers: &[String], rows: &[f64]) -> Result<(), RecordingError> {
+/// [`RecordingError::Output`], and [`RecordingError::RowWidth`] when `rows` is no whole number of rows.
+pub fn write_csv(path: &Path, headers: &[String], rows: &[f64]) -> Result<Written, RecordingError> {
     if headers.is_empty() || !rows.len().is_multiple_of(headers.len()) {
         return Err(RecordingError::RowWidth {
             path: path.to_owned(),
@@ -72,22 +73,7 @@ pub fn write_csv(path: &Path, headers: &[String], rows: &[f64]) -> Result<(), Re
             found: rows.len().checked_rem(headers.len()).unwrap_or(rows.len()),
         });
     }
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".loopsight-").suffix(".tmp");
-    #[cfg(unix)]
-    {
-        // As any other new file, not readable by its owner alone.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let file = builder
-        .tempfile_in(folder)
-        .map_err(|e| io(path, "create a file beside", &e))?;
-    let mut out = BufWriter::new(file);
+    let mut out = OutputFile::create(path)?;
     let written = write_header(&mut out, headers).and_then(|()| {
         rows.chunks_exact(headers.len())
             .try_for_each(|row| write_row(&mut out, row))
@@ -95,18 +81,11 @@ pub fn write_csv(path: &Path, headers: &[String], rows: &[f64]) -> Result<(), Re
     written
         .and_then(|()| out.flush())
         .map_err(|e| io(path, "write", &e))?;
-    let file = out.into_inner().map_err(|e| io(path, "write", e.error()))?;
-    file.persist(path)
-        .map_err(|e| io(path, "write", &e.error))?;
-    Ok(())
+    Ok(out.finish()?)
 }
 
 fn io(path: &Path, action: &'static str, error: &std::io::Error) -> RecordingError {
-    RecordingError::Io {
-        path: path.to_owned(),
-        action,
-        message: error.to_string().into(),
-    }
+    OutputError::io(path, action, error).into()
 }
 
 fn write_header(out: &mut impl Write, headers: &[String]) -> std::io::Result<()> {
@@ -144,8 +123,7 @@ const FLUSH_PERIOD: f64 = 1.0;
 /// its own there), and about once a second they are synced to the disk beside the loop. [`LogWriter::finish`] gives the file its name; dropped before that, the part
 /// stays and can be read.
 pub struct LogWriter {
-    target: PathBuf,
-    part: PathBuf,
+    file: Growing,
     out: Out,
     columns: usize,
     /// Time stamp and instant of the last flush.
@@ -169,9 +147,9 @@ impl LogWriter {
     ///
     /// # Errors
     ///
-    /// [`RecordingError::Io`] when the file cannot be created.
+    /// [`RecordingError::Output`] when the file cannot be created.
     pub fn create(path: &Path, headers: &[String]) -> Result<Self, RecordingError> {
-        let (part, file) = new_part(path)?;
+        let (growing, file) = Growing::create(path)?;
         let sync = Syncer::of(&file);
         let out = if path
             .extension()
@@ -188,10 +166,9 @@ impl LogWriter {
                 row: Vec::new(),
             })
         };
-        let out = out.map_err(|e| io(&part, "write", &e))?;
+        let out = out.map_err(|e| io(growing.part(), "write", &e))?;
         Ok(Self {
-            target: path.to_owned(),
-            part,
+            file: growing,
             out,
             columns: headers.len(),
             flushed: None,
@@ -201,18 +178,18 @@ impl LogWriter {
 
     /// Where the rows are until the log is finished.
     pub fn part_path(&self) -> &Path {
-        &self.part
+        self.file.part()
     }
 
     /// Appends a row; the first value is the time in seconds.
     ///
     /// # Errors
     ///
-    /// [`RecordingError::RowWidth`] or [`RecordingError::Io`].
+    /// [`RecordingError::RowWidth`] or [`RecordingError::Output`].
     pub fn write(&mut self, row: &[f64]) -> Result<(), RecordingError> {
         if row.len() != self.columns {
             return Err(RecordingError::RowWidth {
-                path: self.target.clone(),
+                path: self.file.target().to_owned(),
                 expected: self.columns,
                 found: row.len(),
             });
@@ -224,7 +201,7 @@ impl LogWriter {
             }
             Out::Mcap(log) => log.row(row).map_err(std::io::Error::other),
         };
-        written.map_err(|e| io(&self.part, "write", &e))?;
+        written.map_err(|e| io(self.file.part(), "write", &e))?;
         let time = row.first().copied().unwrap_or(f64::NAN);
         let due = match self.flushed {
             None => {
@@ -247,7 +224,7 @@ impl LogWriter {
             Out::Mcap(log) => log.flush().map_err(std::io::Error::other),
         };
         self.sync.flushed();
-        flushed.map_err(|e| io(&self.part, "write", &e))
+        flushed.map_err(|e| io(self.file.part(), "write", &e))
     }
 
     /// Writes what happened at a time (s), and all rows so far to the disk: after a run was killed, events are
@@ -255,59 +232,30 @@ impl LogWriter {
     ///
     /// # Errors
     ///
-    /// [`RecordingError::Io`].
+    /// [`RecordingError::Output`].
     pub fn remark(&mut self, time: f64, text: &str) -> Result<(), RecordingError> {
         let text = text.replace(['\n', '\r'], " ");
         let written = match &mut self.out {
             Out::Csv { out, .. } => writeln!(out, "# {time:.3} s: {text}"),
             Out::Mcap(log) => log.event(time, &text).map_err(std::io::Error::other),
         };
-        written.map_err(|e| io(&self.part, "write", &e))?;
+        written.map_err(|e| io(self.file.part(), "write", &e))?;
         self.flush(time)
     }
 
-    /// Writes what is left and gives the file its name; returns it.
+    /// Writes what is left and gives the file its name.
     ///
     /// # Errors
     ///
-    /// [`RecordingError::Io`]; the part file then remains.
-    pub fn finish(self) -> Result<PathBuf, RecordingError> {
-        let Self {
-            target, part, out, ..
-        } = self;
+    /// [`RecordingError::Output`]; the part file then remains.
+    pub fn finish(self) -> Result<Written, RecordingError> {
+        let Self { file, out, .. } = self;
         let written = match out {
             Out::Csv { mut out, .. } => out.flush(),
             Out::Mcap(log) => log.finish().map_err(std::io::Error::other),
         };
-        written
-            .and_then(|()| File::open(&part)?.sync_all())
-            .map_err(|e| io(&part, "write", &e))?;
-        std::fs::rename(&part, &target)
-            .map_err(|e| io(&target, "rename the finished log to", &e))?;
-        Ok(target)
-    }
-}
-
-/// How many abandoned parts may lie beside a log.
-const MAX_PARTS: usize = 1000;
-
-fn new_part(path: &Path) -> Result<(PathBuf, File), RecordingError> {
-    let mut number = 1;
-    loop {
-        let mut name = path.as_os_str().to_owned();
-        name.push(if number == 1 {
-            ".part".to_owned()
-        } else {
-            format!(".{number}.part")
-        });
-        let part = PathBuf::from(name);
-        match File::create_new(&part) {
-            Ok(file) => return Ok((part, file)),
-            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && number < MAX_PARTS => {
-                number += 1;
-            }
-            Err(e) => return Err(io(&part, "create", &e)),
-        }
+        written.map_err(|e| io(file.part(), "write", &e))?;
+        Ok(file.finish()?)
     }
 }
 
@@ -369,7 +317,7 @@ mod tests {
             "{wrong}"
         );
         let part = log.part_path().to_owned();
-        assert_eq!(log.finish().unwrap(), path);
+        assert_eq!(log.finish().unwrap().path, path);
         assert!(!part.exists());
         let source::Source::Table(table) = crate::read(&path).unwrap() else {
             panic!("a table")
@@ -425,7 +373,7 @@ mod tests {
         let text = std::fs::read_to_string(log.part_path()).unwrap();
         assert_eq!(text, "time_s,u_V\n0,1\n# 0.000 s: an actuator saturates\n");
         log.write(&[0.1, 2.0]).unwrap();
-        let source::Source::Table(table) = crate::read(&log.finish().unwrap()).unwrap() else {
+        let source::Source::Table(table) = crate::read(&log.finish().unwrap().path).unwrap() else {
             panic!("a table")
         };
         assert_eq!(table.runs[0].rows, [0.0, 1.0, 0.1, 2.0]);

@@ -8,6 +8,7 @@ use loopsight_core::unit::{Dimension, UnitError};
 use loopsight_formats::FormatError;
 
 use crate::names::{did_you_mean, list};
+use crate::output::OutputError;
 
 /// Where in a log a value stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,6 +49,9 @@ pub enum RecordingError {
         /// What the system said.
         message: Box<str>,
     },
+    /// A log cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// A folder where a file is expected.
     #[error("{}: this is a folder; a log is a CSV file or a SysId JSON file", path.display())]
     Directory {

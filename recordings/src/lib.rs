@@ -21,7 +21,7 @@
 //! assert!((log.runs[0].sample(2)[0] - std::f64::consts::TAU).abs() < 1e-12); // 60 rpm
 //! ```
 //!
-//! [`write_csv`] and [`LogWriter`] write logs that read back to the same numbers.
+//! [`write_csv`] and [`LogWriter`] write logs that read back to the same numbers; [`output`] writes every file.
 
 mod channels;
 mod csv_read;
@@ -38,6 +38,7 @@ mod median;
 mod model_file;
 mod names;
 mod naming;
+pub mod output;
 mod plan;
 mod segment;
 mod source;

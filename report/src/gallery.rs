@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use loopsight_diagnosis::{Comparison, Conclusion};
-use loopsight_recordings::{Fault, FaultKind};
+use loopsight_recordings::{Fault, FaultKind, output};
 
 use crate::findings::{diagnosis, improvement, pair};
 use crate::fixtures::{comparison, context, friction_runs, loop_record};
 use crate::{
     Context, LoopRecord, comparison_page, diagnosis_page, figure_svg, fit, improvement_page,
-    run_page, save,
+    run_page,
 };
 
 /// Writes the pages into the folder that `LOOPSIGHT_PAGES` names.
@@ -32,7 +32,7 @@ fn pages_to_look_at() {
 }
 
 fn write(folder: &Path, name: &str, text: &str) {
-    save(&folder.join(name), text).unwrap();
+    output::save(&folder.join(name), text.as_bytes()).unwrap();
 }
 
 /// Runs: one, five, long ones, one signal of one, none.

@@ -9,11 +9,11 @@
 //! | [`run_page`] | a control loop at work |
 //!
 //! A page is the text of an HTML file. Style, data and the charts' library (plotly.js) are inside, compressed, so
-//! it opens offline in any browser of 2023 or later. It fetches nothing and sends nothing. [`save`] writes it
-//! whole or not at all. [`figure_svg`] draws static pictures for texts.
+//! it opens offline in any browser of 2023 or later. It fetches nothing and sends nothing. [`figure_svg`] draws static pictures for texts.
 //!
 //! ```
-//! use loopsight_report::{Context, ControlledTrace, LoopRecord, run_page, save};
+//! use loopsight_recordings::output;
+//! use loopsight_report::{Context, ControlledTrace, LoopRecord, run_page};
 //!
 //! // What a loop did, tick by tick, in SI units. Here: one signal, three ticks.
 //! let record = LoopRecord {
@@ -38,7 +38,7 @@
 //! assert!(page.contains("The loop ran 3 ticks of 10\u{a0}ms, 0.03\u{a0}s in all."));
 //!
 //! let folder = tempfile::tempdir()?;
-//! save(&folder.path().join("run.html"), &page)?;
+//! output::save(&folder.path().join("run.html"), page.as_bytes())?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -68,7 +68,6 @@ mod record;
 mod residual_force;
 mod run;
 mod run_figure;
-mod save;
 mod scatter;
 mod thin;
 mod typeset;
@@ -92,5 +91,4 @@ pub use record::{
 };
 pub use run::run_page;
 pub use run_figure::run_figure;
-pub use save::{ReportError, save};
 pub use words::ASTRAY;

@@ -226,6 +226,65 @@ fn the_command_line_looks_through_the_library_alone() {
     }
 }
 
+/// Where files are made and get their names, and who else may, for what that has nothing to do with results.
+const WRITERS: [(&str, &str); 2] = [
+    ("recordings/src/output/", "the one place that writes files"),
+    (
+        "drivers/src/linux_gpio/file.rs",
+        "files of the kernel, which are pins",
+    ),
+];
+
+/// What makes, renames or copies a file.
+const WRITING: [&str; 12] = [
+    "fs::write",
+    "fs::rename",
+    "fs::copy",
+    "fs::hard_link",
+    "fs::OpenOptions",
+    "{File, OpenOptions",
+    "File::create",
+    "File::options",
+    "persist(",
+    "persist_noclobber(",
+    "tempfile_in(",
+    "tempdir_in(",
+];
+
+/// Nothing half written, nothing replaced that is no file: there is one place to look for it.
+#[test]
+fn one_place_writes_files() {
+    let mut looked_at = 0;
+    for path in sources() {
+        let name = path.strip_prefix(repository()).unwrap();
+        let name = name.to_string_lossy().replace('\\', "/");
+        // Rooms of the workspace without their tests; examples show what is shown to a person.
+        let of_a_room = ARROWS
+            .iter()
+            .any(|(room, _)| *room != "tests" && name.starts_with(&format!("{room}/src/")));
+        let test = name.ends_with("tests.rs") || name.contains("/tests/");
+        if !of_a_room || test || WRITERS.iter().any(|(place, _)| name.starts_with(place)) {
+            continue;
+        }
+        looked_at += 1;
+        let text = std::fs::read_to_string(&path).unwrap();
+        let code = text.split("#[cfg(test)]\nmod ").next().unwrap_or("");
+        for (number, line) in code.lines().enumerate() {
+            let line = line.split("//").next().unwrap_or("");
+            for word in WRITING {
+                // `OutputFile::create` is another word than `File::create`.
+                let mut found = line.match_indices(word);
+                assert!(
+                    !found.any(|(at, _)| !line[..at].ends_with(char::is_alphanumeric)),
+                    "{name}:{}: `{word}`; files are written by loopsight_recordings::output",
+                    number + 1
+                );
+            }
+        }
+    }
+    assert!(looked_at > 300, "{looked_at} files");
+}
+
 #[test]
 fn no_file_is_too_long() {
     let long: Vec<String> = sources()

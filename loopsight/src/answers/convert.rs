@@ -1,5 +1,6 @@
 //! What [`Session::convert`](crate::Session::convert) answers.
 
+use loopsight_recordings::output::Written;
 use serde::Serialize;
 
 use super::Answer;
@@ -24,8 +25,18 @@ pub struct ConvertAnswer {
     pub duration_s: f64,
     /// The columns of the file.
     pub columns: Vec<String>,
+    #[serde(skip)]
+    #[cfg_attr(feature = "schema", schemars(skip))]
+    pub(crate) written: Written,
 }
 
 impl Answer for ConvertAnswer {
     const SCHEMA: &'static str = "loopsight/convert/1";
+}
+
+impl ConvertAnswer {
+    /// The file that was written, and whether it replaced one.
+    pub fn written(&self) -> &Written {
+        &self.written
+    }
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use loopsight_core::Signal;
 use loopsight_diagnosis::{ExperimentLimits, Plan};
+use loopsight_recordings::output::Written;
 use loopsight_recordings::{header, write_csv};
 use serde::Serialize;
 
@@ -140,7 +141,7 @@ impl ExperimentAnswer {
     /// # Errors
     ///
     /// There is no plan, or the file cannot be written.
-    pub fn save(&mut self, path: impl AsRef<Path>) -> Result<()> {
+    pub fn save(&mut self, path: impl AsRef<Path>) -> Result<Written> {
         if !self.answers() {
             return Err(Error::request(
                 "there is no plan to write: no inputs answer the question",
@@ -158,8 +159,9 @@ impl ExperimentAnswer {
             .flat_map(|(t, row)| std::iter::once(*t).chain(row.iter().copied()))
             .map(rounded)
             .collect();
-        write_csv(path, &headers, &rows).map_err(|e| Error::in_log(&e, &name, None))?;
+        let written = write_csv(path, &headers, &rows);
+        let written = written.map_err(|e| Error::in_log(&e, &name, None))?;
         self.file = Some(name);
-        Ok(())
+        Ok(written)
     }
 }

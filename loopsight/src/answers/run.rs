@@ -1,9 +1,10 @@
 //! What [`Session::run`](crate::Session::run) answers.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use loopsight_diagnosis::tracking::step_responses;
+use loopsight_recordings::output::Written;
 use loopsight_report::{InnovationTrace, LoopRecord};
 use serde::Serialize;
 
@@ -72,7 +73,7 @@ pub struct RunAnswer {
     about: About,
     #[serde(skip)]
     #[cfg_attr(feature = "schema", schemars(skip))]
-    written: Option<PathBuf>,
+    written: Option<Written>,
 }
 
 /// Standard normal quantile of a 95 % interval.
@@ -88,7 +89,7 @@ impl RunAnswer {
         failed: bool,
         notes: &[String],
         about: About,
-        (log, written): (Option<PathBuf>, Option<PathBuf>),
+        (log, written): (Option<PathBuf>, Option<Written>),
         with_series: bool,
     ) -> Self {
         let record = &recorder.record;
@@ -170,9 +171,9 @@ impl RunAnswer {
         self.failed.then(|| Error::work(self.end.clone()))
     }
 
-    /// The log that was written.
-    pub fn log_written(&self) -> Option<&Path> {
-        self.written.as_deref()
+    /// The log that was written, and whether it replaced one.
+    pub fn log_written(&self) -> Option<&Written> {
+        self.written.as_ref()
     }
 
     fn title(&self) -> String {

@@ -1,5 +1,7 @@
 //! What [`Session::simulate`](crate::Session::simulate) answers.
 
+use std::path::PathBuf;
+
 use loopsight_model::run::Run;
 use serde::Serialize;
 
@@ -25,6 +27,9 @@ pub struct SimulateAnswer {
     #[serde(skip)]
     #[cfg_attr(feature = "schema", schemars(skip))]
     log: Log,
+    #[serde(skip)]
+    #[cfg_attr(feature = "schema", schemars(skip))]
+    reads: Vec<PathBuf>,
 }
 
 impl Answer for SimulateAnswer {
@@ -32,7 +37,7 @@ impl Answer for SimulateAnswer {
 }
 
 impl SimulateAnswer {
-    pub(crate) fn new(run: &Run, log: Log) -> Self {
+    pub(crate) fn new(run: &Run, log: Log, reads: Vec<PathBuf>) -> Self {
         let (samples, duration_s) = (run.len(), run.duration());
         Self {
             schema: Self::SCHEMA,
@@ -41,7 +46,13 @@ impl SimulateAnswer {
             columns: log.columns(),
             summary: format!("{samples} samples over {duration_s} s"),
             log,
+            reads,
         }
+    }
+
+    /// The files that the experiment names and that were read: none of them is the place for the log.
+    pub fn reads(&self) -> &[PathBuf] {
+        &self.reads
     }
 
     /// The log of the robot.

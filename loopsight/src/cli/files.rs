@@ -4,21 +4,24 @@ use std::path::{Path, PathBuf};
 
 use super::output;
 use crate::error::{Error, Result};
-use crate::{Log, Model, Session, files};
+use crate::{Log, Model, Session, Written, files};
 
 /// Refuses outputs that cannot be written, or that this command reads, before its work.
 pub(crate) fn check<'p>(
     outputs: impl IntoIterator<Item = &'p PathBuf>,
     inputs: &[&[PathBuf]],
 ) -> Result<()> {
-    for output in outputs {
-        files::writable(output)?;
-        files::apart(
-            output,
-            inputs.iter().copied().flatten().map(PathBuf::as_path),
-        )?;
+    for path in outputs {
+        files::check(path)?;
+        apart(path, inputs)?;
     }
     Ok(())
+}
+
+/// Refuses an output that is one of the inputs.
+pub(crate) fn apart(path: &Path, inputs: &[&[PathBuf]]) -> Result<()> {
+    let inputs = inputs.iter().copied().flatten();
+    Ok(files::apart(path, inputs.map(PathBuf::as_path))?)
 }
 
 /// `[MODEL] LOG`, without some of its runs, with further logs and one to judge on; none of them is one of
@@ -71,16 +74,7 @@ pub(crate) fn page(path: Option<&PathBuf>, make: impl FnOnce(&str) -> String) ->
 
 /// Writes a text file, and says so, and whether it replaced one.
 pub(crate) fn save(path: &Path, text: &str) -> Result<()> {
-    let replaced = path.exists();
-    files::save(path, text)?;
-    if replaced {
-        let shown = path.display();
-        output::note(&format!(
-            "wrote {shown} in place of the file that was there"
-        ));
-    } else {
-        wrote(path);
-    }
+    wrote(&files::save(path, text)?);
     Ok(())
 }
 
@@ -90,16 +84,15 @@ pub(crate) fn save_described(path: &Path, session: &Session) -> Result<()> {
     if !session.described {
         return Ok(());
     }
-    files::save(path, session.model().to_toml())?;
+    let written = files::save(path, session.model().to_toml())?;
     output::note(&format!(
-        "wrote {}, the model as the log describes it: what is wrong with the log can be put right there \
-         (`scale = -1` turns a signal's sign), and the file given before the log",
-        path.display()
+        "{written}, the model as the log describes it: what is wrong with the log can be put right there \
+         (`scale = -1` turns a signal's sign), and the file given before the log"
     ));
     Ok(())
 }
 
 /// Says that a file was written.
-pub(crate) fn wrote(path: &Path) {
-    output::note(&format!("wrote {}", path.display()));
+pub(crate) fn wrote(written: &Written) {
+    output::note(&written.to_string());
 }

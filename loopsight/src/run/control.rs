@@ -11,6 +11,7 @@ use crate::about::About;
 use crate::bounded;
 use crate::columns;
 use crate::error::Result;
+use crate::files::Reads;
 use crate::model::Model;
 use crate::session::map;
 use crate::words::number;
@@ -101,8 +102,8 @@ impl Loop {
             .map_or_else(|| PathBuf::from(path), |folder| folder.join(path))
     }
 
-    /// Composes the loop around `model`.
-    pub(crate) fn compose(&self, model: &ComposedModel) -> Result<Composed> {
+    /// Composes the loop around `model`; `reads` gets the files that this reads.
+    pub(crate) fn compose(&self, model: &ComposedModel, reads: &Reads) -> Result<Composed> {
         let (file, source) = (&self.parsed, self.source()?);
         let ticks = file.duration_s.map_or(0.0, |d| d / file.period_s);
         if file.period_s > 0.0 && ticks > MOST_TICKS {
@@ -116,12 +117,12 @@ impl Loop {
             return Err(source.error(&["duration_s".into()], &message, None).into());
         }
         let load_model = |name: &str| {
-            ComposedModel::load(&self.beside(name))
+            ComposedModel::load(&reads.note(self.beside(name)))
                 .map(|(model, _)| model)
                 .map_err(|e| BuildError::at("model", e.to_string()))
         };
         let load_runs = |name: &str, model: &ComposedModel| {
-            let path = self.beside(name);
+            let path = reads.note(self.beside(name));
             let wrong = |e: &loopsight_recordings::RecordingError| {
                 BuildError::at("recording", e.to_string())
             };
@@ -133,14 +134,17 @@ impl Loop {
             period: file.period_s,
             load_model: &load_model,
             load_runs: &load_runs,
-            read_column: &|name, column| columns::read(&self.beside(name), column),
+            read_column: &|name, column| columns::read(&reads.note(self.beside(name)), column),
         };
         Ok(file.compose(&source, model, &context)?)
     }
 
     /// What the loop is, in a sentence, once it was composed around `model`.
     pub(crate) fn described(&self, model: &Model) -> Result<String> {
-        let (file, composed) = (&self.parsed, self.compose(&model.composed)?);
+        let (file, composed) = (
+            &self.parsed,
+            self.compose(&model.composed, &Reads::default())?,
+        );
         let estimator = file
             .estimator
             .as_ref()

@@ -7,13 +7,14 @@ use loopsight_model::config::nearest;
 use loopsight_model::model::Model;
 use loopsight_model::registry;
 use loopsight_model::run::Run;
+use loopsight_recordings::output::NewFolder;
 
 use super::Made;
-use super::folder::Folder;
 use super::model_text::model_text;
 use super::pace::{Pace, rounded_down};
 use super::texts::{DRIVE, commands, experiment_text, loop_text, readme_text};
 use crate::error::{Error, Result};
+use crate::files::Reads;
 use crate::run::Loop;
 use crate::simulate::Experiment;
 
@@ -23,7 +24,7 @@ const NOISE: f64 = 0.01;
 /// Makes the folder `target` for a robot of this plant.
 pub(crate) fn robot(target: &Path, plant: &str) -> Result<Made> {
     let meta = find(plant)?;
-    let mut folder = Folder::new(target)?;
+    let mut folder = NewFolder::create(target)?;
     let (model, measured) = example(meta)?;
     let drive: Vec<f64> = meta.inputs.iter().map(|i| DRIVE * i.size).collect();
     let pace = Pace::of(&model, &drive);
@@ -89,7 +90,7 @@ fn example(meta: &'static PlantMeta) -> Result<(Model, Vec<&'static Signal>)> {
 
 fn simulate(model: &Model, text: &str, meta: &PlantMeta) -> Result<Run> {
     let file = format!("the experiment for `{}`", meta.id);
-    Experiment::from_toml(&file, text)?.simulate(model)
+    Experiment::from_toml(&file, text)?.simulate(model, &Reads::default())
 }
 
 /// What each measured signal does while the inputs are held once: the rms of its change over that
@@ -111,12 +112,13 @@ fn deviations(run: &Run, pace: Pace) -> Vec<f64> {
 
 /// Writes the first loop that can be composed: one that learns, or one that does not. A plant
 /// without controlled states has none.
-fn with_loop(folder: &mut Folder, meta: &PlantMeta, trial: &Run, pace: Pace) -> Result<bool> {
+fn with_loop(folder: &mut NewFolder, meta: &PlantMeta, trial: &Run, pace: Pace) -> Result<bool> {
     for learns in [true, false] {
         let text = loop_text(folder.name(), meta, &deviations(trial, pace), pace, learns);
         let path = folder.inside().join("loop.toml");
         let control = Loop::from_toml(&path.display().to_string(), &text);
-        let composed = control.and_then(|c| c.compose(&c.model()?.composed).map(drop));
+        let composed =
+            control.and_then(|c| c.compose(&c.model()?.composed, &Reads::default()).map(drop));
         if composed.is_ok() {
             folder.write("loop.toml", &text)?;
             return Ok(true);

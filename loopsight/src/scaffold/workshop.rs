@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use loopsight_model::config::read_text;
+use loopsight_recordings::output::NewFolder;
 
 use super::Made;
-use super::folder::Folder;
 use crate::error::{Error, Result};
 
 /// Files of `examples/custom-plant`, which is built and tested as it stands: what is handed out
@@ -88,7 +88,7 @@ impl Source {
 /// Makes the folder `target` for a crate that is built with the checkout `loopsight`, or else with the
 /// one that this program came from, or else with what is published.
 pub(crate) fn workshop(target: &Path, loopsight: Option<&Path>) -> Result<Made> {
-    let mut folder = Folder::new(target)?;
+    let mut folder = NewFolder::create(target)?;
     check_name(folder.name())?;
     let source = source(loopsight)?;
     let manifest = manifest(folder.name(), &source);

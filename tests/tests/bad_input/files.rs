@@ -93,3 +93,71 @@ fn a_disk_that_is_full() {
         assert!(!desk.path("new.csv").exists() && !desk.path("new.html").exists());
     }
 }
+
+/// What a file names is read as well: an experiment's inputs, a loop's references and recordings.
+#[test]
+fn what_a_file_names_is_an_input() {
+    let desk = Desk::new();
+    let inputs = std::fs::read_to_string(desk.path("log.csv")).unwrap();
+    desk.write("inputs.csv", &inputs);
+    desk.write(
+        "replay.toml",
+        "duration_s = 1.0\nperiod_s = 0.01\ninputs_from = \"inputs.csv\"\n",
+    );
+    let looped = super::LOOP.replace(
+        "[driver.simulated]",
+        "[driver.simulated]\nmodel = \"robot.toml\"",
+    );
+    std::fs::copy(desk.path("model.toml"), desk.path("robot.toml")).unwrap();
+    desk.write("looped.toml", &looped);
+    for (arguments, stays) in [
+        (
+            &["simulate", "model.toml", "replay.toml", "-o", "inputs.csv"][..],
+            "inputs.csv",
+        ),
+        (&["run", "looped.toml", "-o", "robot.toml"], "robot.toml"),
+        (
+            &["run", "looped.toml", "--html", "robot.toml"],
+            "robot.toml",
+        ),
+        (
+            &["run", "looped.toml", "--svg", "./robot.toml"],
+            "robot.toml",
+        ),
+        (&["inspect", "log.csv", "-o", "log.csv"], "log.csv"),
+    ] {
+        let before = std::fs::read(desk.path(stays)).unwrap();
+        desk.refused_saying(arguments, &[stays, "which this command reads"]);
+        assert_eq!(std::fs::read(desk.path(stays)).unwrap(), before);
+    }
+}
+
+/// Every output says what it replaced, and where it went if its folder is a link.
+#[cfg(unix)]
+#[test]
+fn every_output_says_what_it_replaces() {
+    let desk = Desk::new();
+    std::fs::create_dir(desk.path("elsewhere")).unwrap();
+    std::os::unix::fs::symlink(desk.path("elsewhere"), desk.path("out")).unwrap();
+    for arguments in [
+        &["simulate", "model.toml", "experiment.toml", "-o"][..],
+        &["compare", "model.toml", "log.csv", "--html"],
+        &["fit", "model.toml", "log.csv", "-o"],
+        &["convert", "model.toml", "log.csv", "-o"],
+        &["add", "model.toml", "coulomb_friction", "-o"],
+        &["run", "loop.toml", "-o"],
+        &["run", "loop.toml", "--svg"],
+    ] {
+        for said in ["", " in place of the file that was there"] {
+            let mut words = arguments.to_vec();
+            words.push("out/it.csv");
+            let words: Vec<&OsStr> = words.iter().map(OsStr::new).collect();
+            let output = desk.output(&words);
+            let text = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(output.status.success(), "{arguments:?}: {text}");
+            let sentence = format!("wrote out/it.csv{said} (through a link: it lies at ");
+            assert!(text.contains(&sentence), "{arguments:?}: {text}");
+        }
+        std::fs::remove_file(desk.path("elsewhere/it.csv")).unwrap();
+    }
+}

@@ -36,5 +36,6 @@ pub(crate) fn run(arguments: &ConvertArguments) -> Result<()> {
         both => files::session([out], both, &[], &[], None)?,
     };
     let answer = session.convert(out)?;
+    files::wrote(answer.written());
     output::answer(&answer, &answer.summary, arguments.json)
 }

@@ -26,19 +26,19 @@ pub(crate) fn run(arguments: &ExperimentArguments) -> Result<()> {
     let answer = session.experiment(&options);
     drop(bar);
     let mut answer = answer?;
-    if answer.answers() {
-        answer.save(&arguments.output)?;
-    }
+    let written = if answer.answers() {
+        Some(answer.save(&arguments.output)?)
+    } else {
+        None
+    };
     output::answer(&answer, &report::plan::text(&answer.engine), arguments.json)?;
-    output::note(&if answer.answers() {
-        format!(
-            "wrote {}: {} samples over {} s; record it with the robot at rest and free to move",
-            arguments.output.display(),
+    output::note(&match written {
+        Some(written) => format!(
+            "{written}: {} samples over {} s; record it with the robot at rest and free to move",
             answer.samples(),
             answer.duration_s
-        )
-    } else {
-        "no plan was written".to_owned()
+        ),
+        None => "no plan was written".to_owned(),
     });
     Ok(())
 }

@@ -2,14 +2,13 @@
 
 use crate::answers::InspectedChannel;
 use crate::cli::arguments::InspectArguments;
-use crate::cli::output;
+use crate::cli::{files, output};
 use crate::error::{Error, Result};
-use crate::{FitOptions, InspectOptions, Log, Model, Session, files, inspect, words};
+use crate::{FitOptions, InspectOptions, Log, Model, Session, inspect, words};
 
 pub(crate) fn run(arguments: &InspectArguments) -> Result<()> {
-    if let Some(out) = &arguments.output {
-        files::writable(out)?;
-    }
+    let input = std::slice::from_ref(&arguments.log);
+    files::check(&arguments.output, &[input])?;
     let log = Log::read(&arguments.log)?;
     let mut options = InspectOptions::default();
     options.plant.clone_from(&arguments.plant);

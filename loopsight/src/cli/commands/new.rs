@@ -10,7 +10,7 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<()> {
         Some(plant) => robot(&arguments.folder, plant)?,
         None => workshop(&arguments.folder, arguments.loopsight.as_deref())?,
     };
-    made.written.iter().for_each(|path| files::wrote(path));
+    made.written.iter().for_each(files::wrote);
     if let Some(note) = &made.note {
         output::note(note);
     }

@@ -20,6 +20,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
     let log = arguments.output.clone();
     let options = RunOptions::default()
         .log(log.map_or(LogTo::AsWritten, LogTo::File))
+        .pages(arguments.html.iter().chain(&arguments.svg))
         .series(arguments.series)
         .stopped_by("Ctrl-C")
         .cancel(&interrupt::token())
@@ -33,8 +34,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<()> {
         let _ = dashboard.clear();
     }
     let answer = answer?;
-    if let Some(path) = answer.log_written() {
-        files::wrote(path);
+    if let Some(written) = answer.log_written() {
+        files::wrote(written);
     }
     output::answer(
         &answer,

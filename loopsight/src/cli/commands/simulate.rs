@@ -12,12 +12,9 @@ pub(crate) fn run(arguments: &SimulateArguments) -> Result<()> {
     let session = Session::of_model(Model::from_file(&arguments.model)?);
     let experiment = Experiment::from_file(&arguments.experiment)?;
     let answer = session.simulate(&SimulateOptions::new(experiment))?;
-    answer.log().save(&arguments.output)?;
-    output::note(&format!(
-        "wrote {}: {}",
-        arguments.output.display(),
-        answer.summary
-    ));
+    files::apart(&arguments.output, &[answer.reads()])?;
+    let written = answer.log().save(&arguments.output)?;
+    output::note(&format!("{written}: {}", answer.summary));
     if arguments.json {
         output::result(&answer.to_json()?);
     }
