@@ -37,7 +37,7 @@ pub(crate) fn advice(
             why: match explained {
                 None => format!("{log} never shows in the log"),
                 Some(by) => format!(
-                    "with `{}` at {} {log} shows in the log, but not so that it can be told what it is",
+                    "with `{}` at {} {log} has some influence in the log, but not enough to identify it",
                     by.place.effect,
                     by.place.at.join(", ")
                 ),

@@ -313,7 +313,7 @@ impl<'m> Design<'m> {
             (
                 Promise::Answers,
                 format!(
-                    "{}: fitted as well as it can be, {names} stay {detectability:.0} standard deviations of the sensors' noise apart within {duration:.0} s, at noticeable sizes ({})",
+                    "{}: even after the best fit, {names} differ by {detectability:.0} standard deviations of the sensors' noise after {duration:.0} s, at noticeable sizes ({})",
                     shape.name(),
                     rivals.sizes,
                 ),
@@ -322,7 +322,7 @@ impl<'m> Design<'m> {
             (
                 Promise::TooShort,
                 format!(
-                    "{}: the best found, but {names} come only {detectability:.1} standard deviations of the sensors' noise apart in {duration:.0} s, {} are needed to be sure: that takes about {needed:.0} s, a larger effect than {} or a finer sensor",
+                    "{}: the best found, but {names} differ by only {detectability:.1} standard deviations of the sensors' noise after {duration:.0} s, and {} are needed. That takes about {needed:.0} s, a larger effect than {}, or a finer sensor",
                     shape.name(),
                     criteria.separated,
                     rivals.sizes,
@@ -437,7 +437,7 @@ impl<'m> Design<'m> {
             (
                 Promise::CannotBeSeparated,
                 format!(
-                    "{name} cannot be pinned with inputs alone: with the signals that are measured it has no influence of its own under any of the experiments; freeze another parameter that does the same at a measured value, or add a sensor"
+                    "{name} cannot be pinned with inputs alone: in the measured signals it has no influence of its own under any of the experiments; add a sensor, or measure another parameter with the same influence and freeze it"
                 ),
             )
         } else {

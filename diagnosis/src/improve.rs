@@ -1,4 +1,4 @@
-//! Diagnose, add, refit, until nothing more is missing.
+//! Improving a model: diagnose, add the missing effect, refit, until nothing more is missing.
 
 use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::diagnose::diagnose_above;
@@ -14,8 +14,8 @@ use loopsight_model::model::Model;
 
 /// Repeats [`diagnose`](crate::diagnose()), adding what it finds missing, until it finds nothing more.
 ///
-/// An improvement that is cancelled has the steps that were finished, the model of the last one as the
-/// best, and the verdict [`Conclusion::Cancelled`].
+/// An improvement that is cancelled has the finished steps, the model of the last of them as the best one, and
+/// the verdict [`Conclusion::Cancelled`].
 ///
 /// # Errors
 ///
@@ -44,7 +44,7 @@ pub fn improve(
     state.finish(verdict, measurements, work)
 }
 
-/// An improvement on its way.
+/// An improvement in progress.
 struct State {
     present: Model,
     steps: Vec<ImprovementStep>,
@@ -60,7 +60,7 @@ impl State {
         }
     }
 
-    /// Diagnoses the present model. The first diagnosis also fits it, which is the first step.
+    /// Diagnoses the present model. The first diagnosis also fits it, and that fit is the first step.
     fn diagnose(
         &mut self,
         measurements: &Measurements<'_>,

@@ -15,14 +15,13 @@ use crate::settings::FitSettings;
 
 /// Corrects `model` after the last of `steps`:
 ///
-/// * an effect that the last one made needless goes, and its step with it;
+/// * an effect that the last one made needless is removed, and its step with it;
 /// * a simpler effect replaces one that contains it, where the error hardly grows;
 /// * an effect that the data could not tell from an earlier one replaces it, where the error falls (the
 ///   `diagnoses` of the earlier steps name them);
 /// * the sign of the last effect is made sharper while the error falls.
 ///
-/// The steps then name what the model has. Where the work is cancelled, model and steps agree, with the
-/// changes made until then.
+/// The steps are changed with the model. If the work is cancelled, the two still agree.
 pub(crate) fn refine(
     model: &mut Model,
     steps: &mut Vec<ImprovementStep>,
@@ -43,12 +42,12 @@ pub(crate) fn refine(
     sharpened(&mut best)
 }
 
-/// Takes out effects of earlier steps without which the error is the same: what looked like a dead zone may have
+/// Removes effects of earlier steps without which the error is the same: what looked like a dead zone may have
 /// been part of the friction that was added after it.
 fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<(), FitError> {
     let close = best.work.criteria().choice.close;
     loop {
-        // The last is what was just found missing.
+        // The last effect was just found missing, so it stays.
         let earlier = steps.iter().enumerate().take(steps.len().saturating_sub(1));
         let candidates = earlier.filter_map(|(index, step)| {
             let instances = instances(best.model, step.added.as_ref()?);
@@ -117,10 +116,10 @@ fn reconsidered(
     Ok(())
 }
 
-/// For each of `steps`, what the data still cannot tell from its effect at the end: the twins of its
-/// diagnosis with which the finished `model`, fitted again, would not be beaten. One beats another where its
-/// error is below `improve.better` of the other's, the same ratio that
-/// makes [`refine`] exchange them. A twin that has no place in the model is open no more.
+/// For each of `steps`, the effects that the data still cannot tell from its own at the end. These are twins of
+/// its diagnosis: with one in its place, the finished `model`, fitted again, is about as good. Its error then is
+/// not larger by more than the ratio `improve.better`, which also makes [`refine`] exchange effects. A twin that
+/// no longer fits into the model is left out.
 pub(crate) fn still_open(
     model: &Model,
     steps: &[ImprovementStep],
@@ -156,8 +155,8 @@ fn twins<'a>(step: &ImprovementStep, diagnoses: &'a [Diagnosis]) -> Vec<&'a Effe
     class.filter(|p| step.added.as_ref() != Some(p)).collect()
 }
 
-/// The model with the effect of `other` in the place of that of `place`; parameters of the same name
-/// keep their values, others begin a noticeable step from neutral.
+/// The model with the effect of `other` in place of that of `place`. Parameters of the same name keep their
+/// values, others begin at a noticeable size.
 fn exchanged(model: &Model, place: &EffectAt, other: &EffectAt) -> Option<Model> {
     let instances = instances(model, place);
     let (first, others) = instances.split_first()?;
@@ -183,7 +182,7 @@ fn exchanged(model: &Model, place: &EffectAt, other: &EffectAt) -> Option<Model>
 /// A model, and others that may take its place.
 struct Refined<'a> {
     model: &'a mut Model,
-    /// Its error, once it was needed.
+    /// Its error, once it was computed.
     error: Option<f64>,
     measurements: &'a Measurements<'a>,
     work: &'a Work<'a>,
@@ -276,7 +275,7 @@ fn refitted(
 /// Most halvings.
 const HALVINGS: usize = 3;
 
-/// The sign of the effect added last is smoothed over less and less while the error falls by it.
+/// Halves the smoothing width of the effect added last while that lowers the error.
 fn sharpened(best: &mut Refined<'_>) -> Result<(), FitError> {
     let criteria = &best.work.criteria().improve;
     for _ in 0..HALVINGS {

@@ -81,7 +81,7 @@ impl Problem<'_> {
         let solution = result.param().clone();
         if solution.iter().any(|v| !v.is_finite()) {
             return Err(FitError::Solver(
-                "the parameters left the finite numbers".to_owned(),
+                "the parameters became infinite".to_owned(),
             ));
         }
         let settled = !matches!(result.report.termination, Termination::Limit(_));

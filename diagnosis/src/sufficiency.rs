@@ -38,7 +38,7 @@ pub(crate) fn notes(model: &Model, runs: &[Run]) -> Vec<Advice> {
             let value = value(i).filter(|v| *v != 0.0)?;
             Some(Advice {
                 why: format!(
-                    "`{}` is {value} {} all the time: it counts as known, and what its changes do does not show",
+                    "`{}` is {value} {} all the time: its value counts as known, but the log cannot show what its changes do",
                     input.id, input.unit
                 ),
                 experiment: format!("where that matters, record at other values of `{}`", input.id),

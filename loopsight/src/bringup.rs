@@ -1,4 +1,4 @@
-//! The first time that a robot moves, one step after the other: is it wired as the files say?
+//! The first time that a robot moves: steps that check whether it is wired as the files say.
 
 mod bench;
 mod judge;
@@ -24,8 +24,7 @@ const FIRST: f64 = 0.25;
 /// How a robot is brought up.
 #[derive(Clone, Debug)]
 pub(crate) struct BringupOptions {
-    /// What the motors are first driven with, in the unit of the inputs; by default a quarter of the
-    /// smallest limit.
+    /// Input of the first motions, in the unit of the inputs; by default a quarter of the smallest limit.
     pub(crate) volts: Option<f64>,
     /// How long a motor is driven at a time, s.
     pub(crate) seconds: f64,
@@ -72,7 +71,7 @@ pub(crate) fn bring_up(
     ] {
         if person::answer(person, &options.cancel, question)? != "yes" {
             return Err(Error::work(
-                "nothing was moved: begin again when both are so",
+                "nothing was moved: begin again when the answer to both is yes",
             ));
         }
     }

@@ -13,8 +13,7 @@ use crate::session::map;
 use crate::simulate::Experiment;
 use crate::words;
 
-/// Looks over model, loop and experiment files (TOML) and logs, without doing anything with them. What is
-/// wrong stands in the answer.
+/// Checks model, loop and experiment files (TOML) and logs. What is wrong stands in the answer.
 ///
 /// ```
 /// # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/twil");

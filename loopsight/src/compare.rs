@@ -13,7 +13,7 @@ use crate::watch::{Watch, watched};
 pub struct CompareOptions {
     /// Whether the answer has the series of numbers, sample by sample; by default it has not.
     pub series: bool,
-    /// Who is told how far the work is, and what stops it.
+    /// Who gets the progress, and what stops the work.
     pub watch: Watch,
 }
 
@@ -31,8 +31,8 @@ impl CompareOptions {
 impl Session {
     /// Compares the model with the log: free run and one-step prediction, and where it fails.
     ///
-    /// The model of a log that describes itself has no values: they are fitted first, so that the answer
-    /// is the least error which the plain model can have on this log.
+    /// The model of a log that describes itself has no values, so they are fitted first. The answer then is the least
+    /// error that the plain model can have on this log.
     ///
     /// # Errors
     ///

@@ -13,7 +13,7 @@ use crate::watch::{Watch, watched};
 pub struct DiagnoseOptions {
     /// Whether the answer has the series of numbers, sample by sample; by default it has not.
     pub series: bool,
-    /// Who is told how far the work is, and what stops it.
+    /// Who gets the progress, and what stops the work.
     pub watch: Watch,
 }
 
@@ -29,9 +29,8 @@ impl DiagnoseOptions {
 }
 
 impl Session {
-    /// Adds every effect of the library to the model at every place it fits, refits all parameters each
-    /// time, and judges by the free run on data that the fits did not see: on the test log, where there is
-    /// one, or else on parts of the log.
+    /// Adds every effect of the library to the model at every channel it fits, and refits all parameters each time.
+    /// Each is judged by its free run on validation data: the test log, or else held-out parts of the log.
     ///
     /// A log that is faulty or too short for the model is a verdict, not an error.
     ///

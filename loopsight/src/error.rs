@@ -132,7 +132,7 @@ impl Error {
 
     /// An error in a log; `text` is the log as text, where it is at hand.
     pub(crate) fn in_log(error: &RecordingError, file: &str, text: Option<&str>) -> Self {
-        // A disk that is full is nobody's mistake in the request.
+        // A full disk is not a mistake in the request.
         let written = matches!(error, RecordingError::Output(error) if !error.is_request());
         let mut this = if written {
             Self::work(error.to_string())

@@ -21,7 +21,7 @@ pub struct ExperimentOptions {
     pub period_s: f64,
     /// Length of the experiment, s: by default as long as the question needs, 5 s to 600 s.
     pub duration_s: Option<f64>,
-    /// Who is told how far the work is, and what stops it.
+    /// Who gets the progress, and what stops the work.
     pub watch: Watch,
 }
 
@@ -96,7 +96,7 @@ impl ExperimentOptions {
     }
 }
 
-/// Largest magnitude of the inputs where nobody says one, in their SI unit.
+/// Default for the largest magnitude of the inputs, in their SI unit.
 const LIMIT: f64 = 9.0;
 
 impl Session {
@@ -105,8 +105,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// There is no such effect, channel or parameter, values are missing, or the model leaves its rest by
-    /// itself.
+    /// There is no such effect, channel or parameter, values are missing, or the model is unstable at rest.
     pub fn experiment(&self, options: &ExperimentOptions) -> Result<ExperimentAnswer> {
         let model = &self.model.composed;
         let limits = ExperimentLimits {

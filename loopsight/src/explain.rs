@@ -1,4 +1,4 @@
-//! What a part is, and what the tables of a model file say.
+//! Explanations of parts and of the tables of a model file.
 
 mod tables;
 
@@ -57,7 +57,7 @@ pub fn explain(id: &str) -> Result<ExplainAnswer> {
     ids.extend(parts.iter().map(|m| m.id));
     ids.push(written[0].id);
     ids.extend(tables::TABLES.iter().map(|m| m.id));
-    let mut message = format!("nothing is known by the id `{id}`");
+    let mut message = format!("nothing has the id `{id}`");
     match nearest(id, ids.iter().copied()) {
         Some(near) => message.push_str(&format!("; did you mean `{near}`?")),
         None => message.push_str(&format!("; known are {}", ids.join(", "))),

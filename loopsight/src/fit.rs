@@ -56,7 +56,7 @@ pub struct FitOptions {
     pub max_iterations: u64,
     /// Whether the answer has the series of numbers, sample by sample; by default it has not.
     pub series: bool,
-    /// Who is told how far the work is, and what stops it.
+    /// Who gets the progress, and what stops the work.
     pub watch: Watch,
 }
 

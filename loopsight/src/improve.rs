@@ -1,4 +1,4 @@
-//! Diagnose, add, refit, until nothing more is missing.
+//! Improving a model: diagnose, add the missing effect, refit, until nothing more is missing.
 
 use loopsight_diagnosis::improve;
 use loopsight_model::config::{PathSegment, TomlSource};
@@ -16,7 +16,7 @@ use crate::watch::{Watch, watched};
 pub struct ImproveOptions {
     /// Whether the answer has the series of numbers, sample by sample; by default it has not.
     pub series: bool,
-    /// Who is told how far the work is, and what stops it.
+    /// Who gets the progress, and what stops the work.
     pub watch: Watch,
 }
 
@@ -59,7 +59,7 @@ impl Session {
     }
 }
 
-/// The text of a model with the effects of `best` and all fitted values; what it has not is taken out.
+/// The text of a model with exactly the effects of `best` and all fitted values.
 fn improved_text(source: &TomlSource, before: &Composed, best: &Composed) -> String {
     let is = |a: &Attached, b: &Attached| {
         a.meta.id == b.meta.id && a.at.iter().map(|c| c.id).eq(b.at.iter().map(|c| c.id))

@@ -21,8 +21,8 @@
 //!
 //! **Fit.** The parameters, with intervals of 95 %: [`Session::fit`].
 //!
-//! **Diagnose.** Which effect is missing? Every effect of the library is tried at every place, and judged on
-//! data that no fit saw. **Improve** adds what is missing and refits, until nothing more is.
+//! **Diagnose.** Which effect is missing? Every effect of the library is tried at every channel, and judged on
+//! validation data. **Improve** adds what is missing and refits, until nothing more is.
 //!
 //! ```
 //! use loopsight::{DiagnoseOptions, ImproveOptions, Log, Model, Session};
@@ -40,8 +40,7 @@
 //! ```
 //!
 //! **Ask for more data** where a log cannot tell: [`Session::experiment`] plans the inputs that would.
-//! **Run** the loop with the better model: [`Session::run`]. [`Session::simulate`] makes the log of a robot
-//! that is not there.
+//! **Run** the loop with the better model: [`Session::run`]. [`Session::simulate`] makes the log of a simulated robot.
 //!
 //! # Without files
 //!
@@ -56,8 +55,8 @@
 //!
 //! # Long work
 //!
-//! Options take a callback and a token: [`DiagnoseOptions::progress`], [`DiagnoseOptions::cancel`]. What was
-//! found until then is the answer.
+//! Options take a callback for progress and a token that cancels: [`DiagnoseOptions::progress`],
+//! [`DiagnoseOptions::cancel`]. Work that is cancelled answers with what it has found.
 //!
 //! # Parts of one's own
 //!

@@ -28,7 +28,7 @@ use crate::files;
 #[derive(Clone, Debug)]
 pub struct Model {
     pub(crate) composed: Composed,
-    /// Under this name mistakes in the text are reported.
+    /// The name that stands for the file in error messages.
     pub(crate) file: String,
     text: String,
 }

@@ -30,7 +30,7 @@ pub struct RunOptions {
     pub log: LogTo,
     /// Whether the answer has the series of numbers, tick by tick; by default it has not.
     pub series: bool,
-    /// Stops the loop, which lets go of the robot before it ends; a loop reports no progress.
+    /// Stops the loop, which releases the robot before it ends; a loop reports no progress.
     pub watch: Watch,
     /// Who cancels, for the sentence that says so: by default `its caller`.
     pub stopped_by: Option<String>,
@@ -107,8 +107,8 @@ impl RunOptions {
 }
 
 impl Session {
-    /// Runs a control loop: `control` says which, and the model of the session is that of its controller.
-    /// The robot, simulated or not, has been let go of when this returns.
+    /// Runs the control loop `control`; the model of the session is that of its controller. The robot, simulated or
+    /// not, is released when this returns.
     ///
     /// ```
     /// use loopsight::{LogTo, Loop, RunOptions, Session};

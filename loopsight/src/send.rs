@@ -1,4 +1,4 @@
-//! A robot at the end of a line, told what it is to run.
+//! Sending a model and a law to a robot at the end of a line.
 
 use loopsight_model::loop_file::placed;
 use loopsight_onboard::SendError;
@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::run::Loop;
 use crate::session::Session;
 
-/// How a robot is told what it is to run.
+/// How a model and a law are sent to a robot.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct SendOptions {
@@ -27,8 +27,7 @@ impl SendOptions {
 }
 
 impl Session {
-    /// Tells a robot, waiting or driving, the model of the session with its effects, and the law of
-    /// `control`.
+    /// Sends the model of the session with its effects, and the law of `control`, to a robot, waiting or driving.
     ///
     /// # Errors
     ///

@@ -91,8 +91,8 @@ impl Data {
 }
 
 impl Session {
-    /// A model and a log. Columns are matched with signals by name and unit, or as the model's `[log]`
-    /// says; values become SI; the log is cut into runs and looked over for faults.
+    /// A model and a log. Columns are matched with signals by name and unit, or as the model's `[log]` says. Values
+    /// become SI. The log is cut into runs and checked for faults.
     ///
     /// # Errors
     ///
@@ -143,7 +143,7 @@ impl Session {
         }
     }
 
-    /// A further log of the same machine to learn from.
+    /// Another log of the same machine to fit to.
     ///
     /// # Errors
     ///
@@ -166,7 +166,7 @@ impl Session {
         Ok(self)
     }
 
-    /// A log of the same machine to judge on: nothing is fitted to it.
+    /// A log of the same machine for validation: nothing is fitted to it.
     ///
     /// # Errors
     ///
@@ -215,7 +215,7 @@ impl Session {
     fn further(&mut self, log: &Log) -> Result<Vec<Run>> {
         let Some(data) = &mut self.data else {
             return Err(Error::request(format!(
-                "{}: there is no first log that it could stand beside",
+                "{}: there is no first log to add it to",
                 log.name
             )));
         };
@@ -243,7 +243,7 @@ fn matched(model: &mut Composed, log: &Log) -> Result<(Vec<Run>, Vec<Fault>)> {
             .flat_map(|run| (0..run.len()).map(move |k| run.sample(k)[i]));
         if !samples.any(f64::is_finite) {
             return Err(Error::request(format!(
-                "{}: `{}` has no sample: every value of its column is missing or absurd",
+                "{}: `{}` has no sample: every value of its column is missing or impossible",
                 log.name, signal.id
             )));
         }

@@ -1,4 +1,4 @@
-//! How far long work is, and how to stop it, as every options struct carries it.
+//! Progress of long work and how to stop it: a part of every options struct.
 
 use std::fmt;
 use std::sync::Arc;
@@ -6,10 +6,10 @@ use std::sync::Arc;
 use loopsight_diagnosis::Work;
 pub use loopsight_diagnosis::{CancelToken, Progress, Stage};
 
-/// What is called with how far long work is.
+/// A callback that gets the progress of long work.
 type Report = dyn Fn(&Progress) + Send + Sync;
 
-/// Who is told how far long work is, and what stops it.
+/// Who gets the progress of long work, and what stops it.
 #[derive(Clone, Default)]
 pub struct Watch {
     report: Option<Arc<Report>>,
@@ -58,7 +58,7 @@ impl fmt::Debug for Watch {
 macro_rules! watched {
     ($options:ident) => {
         impl $options {
-            /// Who is told how far the work is, and what stops it, in one.
+            /// Who gets the progress and what stops the work, in one.
             #[must_use]
             pub fn watch(mut self, watch: $crate::Watch) -> Self {
                 self.watch = watch;

@@ -10,7 +10,7 @@ pub(crate) use report::{faults, number};
 
 use crate::answers::{ReferenceStep, RunAnswer, Tracking};
 
-/// How well a model does.
+/// How well a model agrees with a log.
 pub(crate) fn comparison(comparison: &Comparison) -> String {
     report::comparison::summary(comparison).join(" ")
 }

@@ -187,13 +187,13 @@ pub(crate) const TERMS: &str = "<details><summary>What the words mean</summary><
     <dt>Error (nrmse)</dt><dd>Root mean square of measurement minus model, divided by the standard deviation of \
     the measurement. Over all signals it is the root mean square of theirs. 0 % is perfect, 100 % is no better \
     than a constant.</dd>\
-    <dt>Data that the model was not fitted to</dt><dd>The test log, or parts of the log that were kept back from \
-    the fit. A model that is too large does well on the data it was fitted to, and fails there.</dd>\
+    <dt>Data that the model was not fitted to</dt><dd>Validation data: the test log, or parts of the log that were \
+    held out of the fit. A model that is too large does well on the data it was fitted to, and fails there.</dd>\
     <dt>What noise and resolution would leave</dt><dd>The error of the true model: it comes from the noise of the \
     sensors and the steps of the encoders. No model does better.</dd>\
     <dt>Significance</dt><dd>How many standard errors the effect is from no effect. Among a hundred candidates \
     chance often makes 2, and hardly ever 4.</dd>\
-    <dt>95 % interval</dt><dd>If the model is right, the interval holds the true value in 95 of 100 such \
+    <dt>95 % interval</dt><dd>If the model is right, the interval contains the true value in 95 of 100 such \
     logs.</dd>\
     <dt>Could be this instead</dt><dd>An effect that explains these data equally well. Another log has to \
     decide.</dd></dl></details>\n";

@@ -142,7 +142,7 @@ fn rounds(diagnoses: &[Diagnosis]) -> String {
     for (at, diagnosis) in tried.iter().enumerate() {
         let found = match &diagnosis.missing {
             Some(missing) => format!("found {}", place(missing)),
-            None => "found nothing that counts".into(),
+            None => "found no significant effect".into(),
         };
         let open = if at == 0 { " open" } else { "" };
         body.push_str(&format!(

@@ -41,7 +41,7 @@ pub(crate) fn residual_force(force: Option<&ResidualForce>) -> String {
     body.push_str(&match &force.expression {
         Some(expression) => format!(
             "<p>The expression <code>{}</code> accounts for {} of the variance. Paste this at the end of the \
-             model file, fit, and look. Then edit it until it says what the force is:</p>\n\
+             model file and fit it. Then edit it to describe what the force is:</p>\n\
              <pre><code>{}</code></pre>\n",
             escape(&expression.force),
             text(&percent(expression.share_of_variance)),

@@ -101,7 +101,7 @@ fn a_robot_that_is_wired_right_is_walked_through() {
 fn without_a_clear_yes_a_person_or_limits_nothing_moves() {
     let refused = walk(same, LIMITS, &[], &["yes", "y"]);
     fails(&refused, 1, "nothing was moved");
-    fails(&walk(same, LIMITS, &[], &["yes"]), 1, "nobody answers");
+    fails(&walk(same, LIMITS, &[], &["yes"]), 1, "no answer");
     let half = "[limits]\nvoltage_right = { magnitude = 12.0 }\n";
     let unlimited = walk(same, half, &[], &RIGHT);
     fails(&unlimited, 2, "`voltage_left` has no limit");
@@ -113,7 +113,7 @@ fn without_a_clear_yes_a_person_or_limits_nothing_moves() {
     );
     // Somebody who goes away in the middle leaves a robot that stands.
     let gone = walk(same, LIMITS, &[], &RIGHT[..3]);
-    fails(&gone, 1, "nobody answers");
+    fails(&gone, 1, "no answer");
     assert!(gone.1.contains("rest    ok") && !gone.1.contains("signs   ok"));
 }
 
@@ -130,7 +130,7 @@ fn each_wrong_wire_is_blamed() {
         "the encoder of `voltage_right` counts backwards",
     );
     let both = walk(same, LIMITS, &[], &answers("backwards"));
-    fails(&both, 1, "both the other way round");
+    fails(&both, 1, "both reversed");
     let dead = || rewired("-nominal", "0");
     let off = walk(dead(), LIMITS, &[], &answers("nothing"));
     fails(&off, 1, "`voltage_right` moves nothing");

@@ -87,7 +87,7 @@ pub enum QuestionError {
     NothingFree,
     /// The model leaves its rest, or the finite numbers.
     #[error(
-        "the model is unstable: no input planned beforehand keeps it from running away; record it in its loop, with a reference that jumps and something added to the command"
+        "the model is unstable: no input planned beforehand can keep it in range; record it under feedback, with steps of the reference and a disturbance added to the command"
     )]
     Unstable,
     /// A number out of its range.
@@ -334,12 +334,12 @@ impl Rivals {
             "under every experiment that was tried an effect of this kind hides in the model's own parameters".to_owned()
         } else {
             format!(
-                "under every experiment that was tried the one, refitted, follows the other ({:.2} % of the effect are left)",
+                "under every experiment that was tried, one of them refitted does the same as the other ({:.2} % of the effect is left)",
                 100.0 * share
             )
         };
         format!(
-            "{} cannot be separated with inputs alone: {how}. What would: {way}",
+            "{} cannot be separated with inputs alone: {how}. This would separate them: {way}",
             self.names()
         )
     }

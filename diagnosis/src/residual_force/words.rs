@@ -59,7 +59,7 @@ pub(super) fn statement(
         }
     });
     let depends = if named.is_empty() {
-        format!("the mean of the residual force at {at} depends on no single quantity")
+        format!("the residual force at {at} depends on no single quantity")
     } else {
         format!(
             "the residual force at {at} depends on {} of its variance",
@@ -151,7 +151,7 @@ fn draft(group: &Group, law: &Law) -> (EffectDraft, String) {
             .map(|c| group.channels[*c].id.to_owned())
             .collect(),
         force,
-        summary: "what the residual force looks like: edit it until it says what it is".to_owned(),
+        summary: "an expression for the residual force: edit it to describe what it is".to_owned(),
         parameters,
     };
     (draft, plain)

@@ -1,4 +1,4 @@
-//! What several answers say alike.
+//! Parts that several answers have in common.
 
 use std::collections::BTreeMap;
 
@@ -104,7 +104,7 @@ impl std::fmt::Display for LogFault {
 pub struct Correction {
     /// Why the model cannot be simulated from the inputs alone.
     pub because: Because,
-    /// Time in which the observer forgets, s.
+    /// Time constant with which the observer forgets old measurements, s.
     pub horizon_s: f64,
     /// In words.
     pub statement: String,
@@ -127,9 +127,9 @@ impl From<&loopsight_diagnosis::Correction> for Correction {
 pub struct Failing {
     /// In words.
     pub statement: String,
-    /// Share of the squared error it speaks of.
+    /// Share of the squared error that it explains.
     pub share_of_squared_error: f64,
-    /// The measured signal it speaks of.
+    /// The measured signal it is about.
     pub signal: String,
 }
 
@@ -175,7 +175,7 @@ pub struct ParameterEstimate {
     pub unit: String,
     /// Standard error, in that unit; `null` where the data say nothing.
     pub std_error: Option<f64>,
-    /// Interval that holds the true value with 95 % confidence; `null` where the data say nothing.
+    /// Interval that contains the true value with 95 % confidence; `null` where the data say nothing.
     pub interval95: Option<[f64; 2]>,
     /// What the data say of it.
     pub verdict: ParameterVerdict,

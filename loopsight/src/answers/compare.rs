@@ -9,7 +9,7 @@ use super::series::{Series, SeriesOf, series};
 use crate::about::About;
 use crate::words;
 
-/// How well a model does on a log.
+/// How well a model agrees with a log.
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
@@ -56,7 +56,7 @@ impl CompareAnswer {
 
     /// A page with pictures (HTML) that opens offline; `command` stands at its foot and may be empty.
     pub fn page(&self, command: &str) -> String {
-        let title = format!("{} held against {}", self.about.model_name, self.about.log);
+        let title = format!("{} compared with {}", self.about.model_name, self.about.log);
         loopsight_report::comparison_page(&self.about.context(title, command), &self.engine)
     }
 }

@@ -37,7 +37,7 @@ pub struct DiagnoseAnswer {
     pub candidates: Vec<Candidate>,
     /// Where the model as it is fails, the most telling first.
     pub where_it_fails: Vec<Failing>,
-    /// The force that is missing where no effect of the library is it.
+    /// The missing force, where no effect of the library explains it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_force: Option<MissingForce>,
     /// Faults of the log, the worst first.
@@ -73,7 +73,7 @@ pub struct Candidate {
     /// The effect and where.
     #[serde(flatten)]
     pub place: EffectAt,
-    /// Free-run error with it, on data it was not fitted to.
+    /// Free-run error with it, on the validation data.
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub nrmse: f64,
     /// The effect's parameters, by their ids.
@@ -158,8 +158,7 @@ impl DiagnoseAnswer {
     }
 }
 
-/// `model` compared with `runs` for pictures; none where it cannot be simulated over them, for then
-/// there is enough to say without.
+/// `model` compared with `runs` for pictures; none where it cannot be simulated over them.
 pub(super) fn pictures(model: Option<&Composed>, runs: &[Run]) -> Option<Comparison> {
     compare(model?, &Measurements::new(runs), &Work::quiet()).ok()
 }
@@ -182,7 +181,7 @@ pub(super) fn judged_context(
 ) -> loopsight_report::Context {
     let mut context = about.context(format!("{}: {what}", about.model_name), command);
     context.notes.extend(about.test.as_ref().map(|test| {
-        format!("Judged on {test}, which nothing was fitted to; so are the pictures.")
+        format!("Errors and pictures are those on {test}, which nothing was fitted to.")
     }));
     context
 }

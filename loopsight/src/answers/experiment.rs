@@ -34,8 +34,8 @@ pub struct ExperimentAnswer {
     pub separates: Vec<EffectAt>,
     /// The parameters it pins.
     pub pins: Vec<String>,
-    /// Effects: their distance in standard deviations. Parameters: value (or noticeable change, if larger
-    /// or the value is zero) over the predicted standard error.
+    /// Effects: their distance in standard deviations. Parameters: the value over the predicted standard error; a
+    /// noticeable change takes the place of a smaller value.
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub detectability: f64,
     /// What it promises.
@@ -67,7 +67,7 @@ pub struct ExperimentAnswer {
 pub struct ConsideredExperiment {
     /// What it is.
     pub experiment: String,
-    /// As [`ExperimentAnswer::detectability`], after 20 s (or the duration asked for).
+    /// As [`ExperimentAnswer::detectability`], for 20 s (or the duration asked for).
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub detectability: f64,
 }

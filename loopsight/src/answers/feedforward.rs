@@ -13,7 +13,7 @@ const PERIOD: f64 = 0.02;
 const POSITION_ERROR: f64 = 1.0;
 const SPEED_ERROR: f64 = 1.5;
 const VOLTAGE: f64 = 7.0;
-/// Iterations of the Riccati equation, and the change at which it has arrived.
+/// Iterations of the Riccati equation, and the change at which it has converged.
 const ITERATIONS: usize = 100_000;
 const ARRIVED: f64 = 1e-12;
 
@@ -41,8 +41,8 @@ pub struct Feedforward {
     pub feedback: Feedback,
 }
 
-/// Gains of linear quadratic regulators every 20 ms, for errors of 1 unit and 1.5 units per second at 7 V, as
-/// SysId has them by default; what is late in the machine is not allowed for.
+/// Gains of linear quadratic regulators every 20 ms, with SysId's default tolerances: errors of 1 unit and 1.5 units
+/// per second at 7 V. Delays of the machine are neglected.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]

@@ -28,7 +28,7 @@ pub struct FitAnswer {
     /// What follows from the plant's parameters, by name; absent where nothing does.
     #[serde(skip_serializing_if = "Estimates::is_empty")]
     pub derived: Estimates,
-    /// How they were found.
+    /// The method that found them.
     pub method: Method,
     /// Free-run error before the fit; `null` where the file gave no values.
     pub nrmse_before: Option<f64>,
@@ -37,7 +37,7 @@ pub struct FitAnswer {
     pub nrmse_fit: f64,
     /// Iterations (output error) or samples (recursive least squares).
     pub iterations: u64,
-    /// Whether the fit to the free run arrived, and from where; absent for recursive least squares.
+    /// Whether the fit to the free run converged, and from which start; absent for recursive least squares.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub convergence: Option<Convergence>,
     /// Combinations of parameters that the data do not determine, in words.
@@ -60,7 +60,7 @@ pub struct FitAnswer {
     model: Model,
 }
 
-/// Whether a fit arrived.
+/// Whether a fit converged.
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
@@ -70,7 +70,7 @@ pub struct Convergence {
     /// Why not; absent where it did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// The starts that were tried, the one that promised most first.
+    /// The starts that were tried, the most promising first.
     pub starts: Vec<Start>,
 }
 
@@ -81,7 +81,7 @@ pub struct Convergence {
 pub struct Start {
     /// What it was made of.
     pub from: String,
-    /// Free-run error relative to the standard deviation where it ended.
+    /// Free-run error at its end, relative to the standard deviation.
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub nrmse: f64,
 }
@@ -128,7 +128,7 @@ impl FitAnswer {
         }
     }
 
-    /// Whether the fit arrived: an error says why it did not, and what was tried.
+    /// An error if the fit did not converge, with the reason and what was tried.
     ///
     /// # Errors
     ///
@@ -161,7 +161,7 @@ impl FitAnswer {
         );
         if let Some(test) = &about.test {
             context.notes.push(format!(
-                "Pictures and errors are those on {test}, which the model was not fitted to."
+                "Errors and pictures are those on {test}, which the model was not fitted to."
             ));
             context.log_file.clone_from(test);
         }

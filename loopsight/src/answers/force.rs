@@ -1,4 +1,4 @@
-//! A force that no effect of the library is.
+//! A force that no effect of the library explains.
 
 use serde::Serialize;
 
@@ -17,7 +17,7 @@ pub struct MissingForce {
     pub statement: String,
     /// Quantities it depends on, the most telling first.
     pub depends_on: Vec<ForceDependence>,
-    /// An expression to begin with; `null` where none stands out from the noise.
+    /// A first expression; `null` where no term stands out from the noise.
     pub expression: Option<WrittenForce>,
 }
 
@@ -28,8 +28,7 @@ pub struct MissingForce {
 pub struct WrittenForce {
     /// The expression with its numbers.
     pub force: String,
-    /// Share of the force's variance that it accounts for, on blocks of time that its numbers were not
-    /// found from.
+    /// Share of the force's variance that it accounts for, on held-out blocks of time.
     pub share_of_variance: f64,
     /// `[[effect]]` entries for the model file.
     pub toml: String,
@@ -44,11 +43,11 @@ pub struct ForceDependence {
     pub quantity: String,
     /// Its unit.
     pub unit: String,
-    /// Where the quantity is an angle that makes turns: one turn, to which it is reduced.
+    /// One turn, where the quantity is an angle that makes turns. The angle is reduced to it.
     pub period: Option<f64>,
     /// Share of the force's variance that its mean over the quantity accounts for.
     pub share_of_variance: f64,
-    /// The mean force over the quantity: one curve for either direction of motion, or one for all.
+    /// The mean force over the quantity: one curve for each direction of motion, or one for all.
     pub curves: Vec<ForceCurve>,
 }
 

@@ -47,7 +47,7 @@ pub struct ImproveAnswer {
     pub where_it_fails: Vec<Failing>,
     /// What is still open at the end: the added effects that the data could not tell from others.
     pub still_open: Vec<OpenChoice>,
-    /// The force that is missing where no effect of the library is it.
+    /// The missing force, where no effect of the library explains it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual_force: Option<MissingForce>,
     /// Faults of the log, the worst first.
@@ -84,10 +84,10 @@ pub struct ImproveAnswer {
 pub struct ImproveStep {
     /// What was added, under the name that it has in the best model; `null` for the model as it was.
     pub added: Option<EffectAt>,
-    /// Free-run error on what the model was fitted to.
+    /// Free-run error on the fitting data.
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub nrmse_fit: f64,
-    /// Free-run error on what it was not fitted to.
+    /// Free-run error on the validation data.
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub nrmse_test: f64,
     /// What the data cannot tell from it, with all that was added later in the model.

@@ -1,7 +1,7 @@
-//! The words of the answers: enums that say in JSON what the engine says in types.
+//! Enums of the JSON answers, one for each enum of the engine.
 
-/// An enum of the answers with the variants of one of the engine: a variant that is new there does not
-/// compile here, so that the schema never lags behind.
+/// An enum of the answers with the variants of one of the engine. A new variant there does not compile here, so the
+/// schema is always complete.
 macro_rules! mirror {
     (
         $(#[$meta:meta])*
@@ -39,18 +39,18 @@ mirror! {
     Verdict of loopsight_diagnosis::Conclusion {
         /// An effect of the library explains what the model does not.
         EffectMissing,
-        /// The model explains the measurements as far as their noise lets tell.
+        /// The model explains the measurements down to their noise.
         NothingMissing,
-        /// Something is missing, and nothing in the library is it.
+        /// Something is missing, and no effect of the library explains it.
         UnknownEffect,
-        /// The recording cannot carry the model.
+        /// The recording does not say enough: it is too short, has no motion, or lacks what the test recording shows.
         DataInsufficient,
         /// The recording is at fault.
         LogFaulty,
-        /// The model leaves as much as a constant would from every start, and no effect of the library
-        /// changes that: nothing can be said of it.
+        /// From every start the model leaves as much as a constant would, and no effect of the library changes that.
+        /// Nothing can be concluded.
         NotFitted,
-        /// The work was cancelled: what was found until then is there, and nothing is concluded from it.
+        /// The work was cancelled. What was found until then is reported, without a conclusion.
         Cancelled,
     }
 }
@@ -58,7 +58,7 @@ mirror! {
 mirror! {
     /// What the data say of a parameter.
     ParameterVerdict of loopsight_diagnosis::ParameterVerdict {
-        /// Pinned by the data.
+        /// Determined by the data.
         Good,
         /// Not estimated: it keeps the value of the file.
         #[serde(rename = "held")]
@@ -113,11 +113,11 @@ mirror! {
         IrregularTime,
         /// Missing samples.
         NotANumber,
-        /// Samples of a magnitude that cannot be; they count as missing.
+        /// Samples of an impossible magnitude; they count as missing.
         AbsurdValue,
         /// A sensor that never moves although it should.
         DeadSensor,
-        /// A sensor that stands still in part of the log, or in all of it with some excuse.
+        /// A sensor that stands still in part of the log, or in all of it for a known reason.
         ConstantSensor,
         /// An input that never changes.
         ConstantInput,

@@ -71,7 +71,7 @@ pub trait Answer: Serialize {
     ///
     /// # Errors
     ///
-    /// None is known: an answer has nothing in it that JSON cannot say.
+    /// None is known: JSON can express everything in an answer.
     fn to_json(&self) -> Result<String> {
         serde_json::to_string_pretty(self).map_err(|error| Error::work(error.to_string()))
     }

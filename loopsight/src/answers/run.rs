@@ -33,7 +33,7 @@ pub struct RunAnswer {
     pub end: String,
     /// It ended because something went wrong.
     pub failed: bool,
-    /// Share of the ticks at which the controller wanted more than it could get.
+    /// Share of the ticks at which an input was saturated.
     pub saturated_share: f64,
     /// Share of the ticks whose sample was older than the tick.
     pub stale_share: f64,

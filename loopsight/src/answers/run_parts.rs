@@ -70,7 +70,7 @@ pub struct LearnedParameter {
     pub value: f64,
     /// Standard error in white noise; `null` where nothing was learned.
     pub std_error: Option<f64>,
-    /// Interval that holds the true value with 95 % confidence in white noise; `null` where nothing was
+    /// Interval that contains the true value with 95 % confidence in white noise; `null` where nothing was
     /// learned.
     pub interval95: Option<[f64; 2]>,
 }
@@ -114,7 +114,7 @@ pub struct Happened {
     pub what: String,
 }
 
-/// How well a loop kept to the clock on the wall.
+/// How well a loop kept real time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]

@@ -1,4 +1,4 @@
-//! Series of numbers, for whoever draws pictures of their own.
+//! Series of numbers, for your own pictures.
 
 use loopsight_diagnosis::Comparison;
 use serde::Serialize;
@@ -25,7 +25,7 @@ pub struct Series {
     /// The free run of the model.
     #[cfg_attr(feature = "schema", schemars(with = "Vec<Option<f64>>"))]
     pub model: Vec<f64>,
-    /// Measured less model.
+    /// Measurement minus model.
     #[cfg_attr(feature = "schema", schemars(with = "Vec<Option<f64>>"))]
     pub residual: Vec<f64>,
     /// The model's prediction of each sample from the one before.

@@ -9,10 +9,10 @@ use crate::error::{Error, Result};
 use crate::watch::CancelToken;
 use crate::words::number;
 
-/// No fresh sample for longer is the end, s.
+/// The bring-up ends after this time without a fresh sample, s.
 const STALE: f64 = 0.2;
 
-/// What a motion came to, robot and model: the integrals of the measured signals, and their largest
+/// The result of a motion, of robot or model: the integrals of the measured signals, and their largest
 /// magnitudes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Motion {
@@ -37,7 +37,7 @@ pub(super) struct Bench<'m> {
     stale_s: f64,
     measured: Vec<f64>,
     applied: Vec<f64>,
-    /// Magnitudes of the measured signals that no motion here may come to.
+    /// Magnitudes of the measured signals that no motion here may reach.
     pub(super) most: Vec<f64>,
     cancel: CancelToken,
     stopped: bool,
@@ -69,7 +69,7 @@ impl<'m> Bench<'m> {
         }
     }
 
-    /// Stops the robot; the reason it is stopped for, if any, comes back with what else went wrong.
+    /// Stops the robot. Returns the reason for stopping, if any, with what else went wrong.
     fn fail(&mut self, why: String) -> Error {
         let stopped = self.driver.safe_stop();
         self.stopped = true;
@@ -87,7 +87,7 @@ impl<'m> Bench<'m> {
             .map_err(|e| Error::work(format!("the robot could not be stopped safely: {e}")))
     }
 
-    /// Waits for the next period. Ticks that were missed are not made up for: a person took that time.
+    /// Waits for the next period. Ticks that were missed are not made up for, because a person took that time.
     fn wait(&mut self) {
         let due = self.due.unwrap_or_else(|| self.clock.now());
         self.clock.wait_until(due);
@@ -96,7 +96,7 @@ impl<'m> Bench<'m> {
         self.due = Some(if late { now } else { due } + self.period);
     }
 
-    /// Waits for the next period and reads; looks whether the robot may go on.
+    /// Waits for the next period, reads, and checks whether the robot may go on.
     fn read(&mut self) -> Result<()> {
         self.wait();
         if self.cancel.is_cancelled() {
@@ -117,10 +117,10 @@ impl<'m> Bench<'m> {
         }
         for (i, m) in self.model.measured.iter().enumerate() {
             let (y, most) = (self.measured[i], self.most[i]);
-            // Also what is no number is too much.
+            // NaN is too much as well.
             if y.is_nan() || y.abs() > most {
                 let why = format!(
-                    "{} is {} {}, more than the {} that no motion here should come to",
+                    "{} is {} {}, more than the {} that no motion here should reach",
                     m.signal.id,
                     number(y),
                     m.signal.unit,

@@ -1,6 +1,6 @@
-//! What a motion says of the wires.
+//! What a motion tells about the wiring.
 
-/// What a robot's motion looks like, held against what each input would do to the model.
+/// Which input a robot's motion looks like, compared with what each would do to the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Looks {
     /// Nothing was counted.
@@ -54,7 +54,7 @@ pub(super) fn looks(moved: &[f64], expected: &[Vec<f64>], driven: usize) -> Look
 /// What was seen by the person: whether it turned, and which way.
 pub(super) const SEEN: [&str; 4] = ["forwards", "backwards", "another", "nothing"];
 
-/// Judges input `driven` (of `ids`) by what was seen and what was counted; an error says what to do.
+/// Judges input `driven` (of `ids`) by what the person saw and what was counted; an error says what to do.
 pub(super) fn judge(seen: &str, looks: Looks, driven: usize, ids: &[&str]) -> Result<(), String> {
     let id = ids[driven];
     let other = |k: usize| ids[k];
@@ -67,7 +67,7 @@ pub(super) fn judge(seen: &str, looks: Looks, driven: usize, ids: &[&str]) -> Re
             "the motor of `{id}` turns backwards: swap its two wires, or set `motor_reversed`"
         )),
         ("backwards", Looks::Input(k, true)) if k == driven => Err(format!(
-            "motor and encoder of `{id}` are both the other way round: swap the wires of both, or set \
+            "motor and encoder of `{id}` are both reversed: swap the wires of both, or set \
              `motor_reversed` and `encoder_reversed`"
         )),
         ("another", Looks::Input(k, _)) if k != driven => Err(format!(
@@ -85,13 +85,13 @@ pub(super) fn judge(seen: &str, looks: Looks, driven: usize, ids: &[&str]) -> Re
             "`{id}` moves nothing: check supply, fuse, enable pin and PWM; a stiff gear may need a higher --volts"
         )),
         ("nothing", _) => Err(format!(
-            "counts came while nothing moved under `{id}`: check the encoders' wires and shields"
+            "counts came while nothing moved with `{id}`: check the encoders' wires and shields"
         )),
         (_, Looks::Still) => Err(format!(
             "the motor of `{id}` turns and nothing is counted: check the encoder's supply, wires and counter"
         )),
         _ => Err(format!(
-            "what was counted under `{id}` is like none of the inputs: check the gains (`of`) of the model's \
+            "what was counted with `{id}` fits none of the inputs: check the gains (`of`) of the model's \
              encoders, and that one wheel moves at a time"
         )),
     }
@@ -132,11 +132,7 @@ mod tests {
                 Looks::Input(0, false),
                 "motor of `voltage_right` turns backwards",
             ),
-            (
-                "backwards",
-                Looks::Input(0, true),
-                "both the other way round",
-            ),
+            ("backwards", Looks::Input(0, true), "both reversed"),
             ("another", Looks::Input(1, true), "swap the outputs"),
             (
                 "another",
@@ -147,7 +143,7 @@ mod tests {
             ("nothing", Looks::Still, "moves nothing"),
             ("nothing", Looks::Input(0, true), "while nothing moved"),
             ("forwards", Looks::Still, "nothing is counted"),
-            ("forwards", Looks::Unclear, "like none of the inputs"),
+            ("forwards", Looks::Unclear, "fits none of the inputs"),
         ] {
             assert!(
                 says(seen, looks).contains(part),

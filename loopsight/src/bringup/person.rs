@@ -6,7 +6,7 @@ use super::bench::Bench;
 use crate::error::{Error, Result};
 use crate::watch::CancelToken;
 
-/// Somebody who looks at the robot and answers.
+/// A person who watches the robot and answers.
 pub(crate) trait Person {
     /// Shows a question.
     fn ask(&mut self, question: &str);
@@ -22,15 +22,15 @@ pub(crate) enum Reply {
     Said(String),
     /// Nothing yet.
     NotYet,
-    /// Nobody is there any more.
+    /// The person has left.
     Gone,
 }
 
-/// How often it is looked whether somebody wants to stop.
+/// How often a wish to stop is looked for.
 const LOOK: Duration = Duration::from_millis(50);
 
 fn gone() -> Error {
-    Error::work("nobody answers: bring-up needs a person who looks at the robot")
+    Error::work("no answer: bring-up needs a person who watches the robot")
 }
 
 /// The answer to a question, while nothing is driven.
@@ -61,7 +61,7 @@ pub(super) fn answer_at(
     person.ask(question);
     loop {
         bench.rest()?;
-        // A simulated robot's clock does not wait for anybody.
+        // A simulated robot's clock does not wait for a person.
         match person.reply(Duration::from_millis(1)) {
             Reply::Said(answer) => return Ok(answer),
             Reply::Gone => return Err(gone()),

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::watch::CancelToken;
 use crate::words::{number, percent};
 
-/// How many times what the model expects at the limit no motion may come to.
+/// No motion may reach this multiple of what the model expects at the limit.
 const MOST: f64 = 3.0;
 
 /// Share of the expected motion that a robot at rest may seem to have.
@@ -33,7 +33,7 @@ pub(super) struct Walk<'m> {
     pub(super) cancel: CancelToken,
 }
 
-/// A voltage at one input that goes up, is held and goes down again.
+/// A voltage at one input that rises, stays and falls again.
 #[derive(Clone, Copy)]
 struct Push {
     inputs: usize,
@@ -106,7 +106,7 @@ impl Walk<'_> {
                 usual[j] += first[j];
             }
         }
-        // What no input moves has no size to be held against.
+        // A signal that no input moves has no size to compare with.
         self.bench.most = most
             .into_iter()
             .map(|m| if m > 0.0 { m } else { f64::INFINITY })
@@ -215,7 +215,7 @@ impl Walk<'_> {
         if let Some((row, name, unit)) = metered {
             let far = number((2.0 * expected[row] / unit * 10.0).ceil() / 10.0);
             let question = format!(
-                "For the scale: on the ground, with {far} {name} free ahead, its place marked. It drives straight on \
+                "To check the scale, put the robot on the ground with {far} {name} free ahead, and mark its place. It drives straight \
                  and stops by itself."
             );
             let answer = choose_at(self.person, &mut self.bench, &question, &["go", "skip"])?;

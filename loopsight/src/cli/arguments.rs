@@ -9,7 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 #[command(
     name = "loopsight",
     version,
-    about = "Adaptive control you can see into: compose a control loop from TOML, hold its model against measurements, fit it, run it.",
+    about = "Adaptive control you can see into: compose a control loop from TOML, compare its model with measurements, fit it, run it.",
     after_help = "Exit status: 0 done, 1 the work failed, 2 the request or a file is wrong.",
     propagate_version = true
 )]
@@ -20,21 +20,21 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Begin: a folder for a robot, or a crate with a plant and an effect of your own.
+    /// Make a folder of files for a robot, or a crate with parts of your own.
     New(NewArguments),
-    /// Check model, loop and experiment files, and logs, without doing anything with them.
+    /// Check model, loop and experiment files, and logs.
     Check(CheckArguments),
-    /// Say what is in a log of any program, and write a model file for it.
+    /// Show what is in a log of any program, and write a model file for it.
     Inspect(InspectArguments),
     /// Write the signals that a model has in a log, in SI units, as CSV or MCAP.
     Convert(ConvertArguments),
     /// List the known plants, effects, estimators, controllers and drivers.
     List(ListArguments),
-    /// Explain one of them, or a table of a model file: equation, parameters, example.
+    /// Explain a plant, an effect or another part: equation, parameters, example.
     Explain(ExplainArguments),
     /// Drive a simulated robot with an experiment and write its log.
     Simulate(SimulateArguments),
-    /// Hold a model against a log: free run and one-step prediction.
+    /// Compare a model with a log: free run and one-step prediction.
     Compare(CompareArguments),
     /// Find the parameters of a model from a log, with intervals.
     Fit(FitArguments),
@@ -44,13 +44,13 @@ pub(crate) enum Command {
     Experiment(ExperimentArguments),
     /// Add an effect to a model file, with neutral parameters.
     Add(AddArguments),
-    /// Diagnose, add, refit, until nothing more is missing.
+    /// Add what a diagnosis finds and refit, until nothing more is missing.
     Improve(ImproveArguments),
-    /// Bring a robot up: is it wired as the files say? Step by step, wheels in the air.
+    /// Check step by step, wheels in the air, that a robot is wired as the files say.
     Bringup(BringupArguments),
     /// Run a control loop.
     Run(RunArguments),
-    /// Tell a robot, waiting or driving, the model, effects and law of a loop file.
+    /// Send the model, effects and law of a loop file to a robot, waiting or driving.
     Send(SendArguments),
     /// Print a completion script for a shell.
     Completions {
@@ -67,7 +67,7 @@ pub(crate) struct NewArguments {
     /// Files for a robot of this plant: model, experiment, loop; `loopsight list plants` shows them.
     #[arg(long, value_name = "PLANT")]
     pub(crate) plant: Option<String>,
-    /// A Rust crate with a plant and an effect of its own, and the whole command around them.
+    /// A Rust crate with a plant and an effect of its own, and a command that has them.
     #[arg(long)]
     pub(crate) rust: bool,
     /// The checkout of loopsight that the crate is built with; by default the one that this command
@@ -115,7 +115,7 @@ pub(crate) struct InspectArguments {
 #[derive(Debug, Args)]
 #[command(override_usage = "loopsight convert [OPTIONS] [MODEL] <LOG> --output <FILE>")]
 pub(crate) struct ConvertArguments {
-    /// Model file and log; without a model file the channels are taken for what `inspect` takes them for.
+    /// Model file and log; without a model file the channels get the meaning that `inspect` finds.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// The file to write: MCAP where its name ends in `.mcap`, CSV where it ends in `.csv`.
@@ -147,7 +147,7 @@ pub(crate) enum RoleName {
 
 #[derive(Debug, Args)]
 pub(crate) struct ExplainArguments {
-    /// Id of a plant, an effect, an estimator, a controller or a driver; `log`, `fit` or `simulation`: the table of
+    /// Id of a plant, effect, estimator, controller or driver; or `log`, `fit`, `simulation` for that table of
     /// a model file.
     pub(crate) id: String,
     /// JSON on standard output.
@@ -195,19 +195,19 @@ pub(crate) struct FitArguments {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
-    /// A further recording of the same machine to learn from, beside LOG; may be given again.
+    /// Another recording of the same machine to fit to, beside LOG; may be given again.
     #[arg(long, value_name = "LOG3")]
     pub(crate) also: Vec<PathBuf>,
     /// Leave this run of the log out, by its name; may be given again.
     #[arg(long, value_name = "RUN")]
     pub(crate) without: Vec<String>,
-    /// Judge the fitted model on this log, which it was not fitted to.
+    /// Validate the fitted model on this log, which it is not fitted to.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,
     /// How the parameters are found.
     #[arg(long, value_enum, default_value_t = MethodName::OutputError)]
     pub(crate) method: MethodName,
-    /// The regression that recursive least squares is fed with.
+    /// The regression for recursive least squares.
     #[arg(long, value_enum, default_value_t = SchemeName::Integrated)]
     pub(crate) regression: SchemeName,
     /// Write the fitted model here: the model file with its comments, the values replaced.
@@ -246,13 +246,13 @@ pub(crate) struct DiagnoseArguments {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
-    /// A further recording of the same machine to learn from, beside LOG; may be given again.
+    /// Another recording of the same machine to fit to, beside LOG; may be given again.
     #[arg(long, value_name = "LOG3")]
     pub(crate) also: Vec<PathBuf>,
     /// Leave this run of the log out, by its name; may be given again.
     #[arg(long, value_name = "RUN")]
     pub(crate) without: Vec<String>,
-    /// Judge on this log; without it, on parts of LOG that the fits do not see.
+    /// Validate on this log; without it, on parts of LOG that are held out of the fits.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,
     /// JSON on standard output.
@@ -319,13 +319,13 @@ pub(crate) struct ImproveArguments {
     /// Model file and log; a log that describes itself (SysId JSON) needs no model file.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
-    /// A further recording of the same machine to learn from, beside LOG; may be given again.
+    /// Another recording of the same machine to fit to, beside LOG; may be given again.
     #[arg(long, value_name = "LOG3")]
     pub(crate) also: Vec<PathBuf>,
     /// Leave this run of the log out, by its name; may be given again.
     #[arg(long, value_name = "RUN")]
     pub(crate) without: Vec<String>,
-    /// Judge on this log; without it, on parts of LOG that the fits do not see.
+    /// Validate on this log; without it, on parts of LOG that are held out of the fits.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,
     /// Write the best model here: the model file with the effects added and all values fitted.
@@ -360,7 +360,7 @@ pub(crate) struct RunArguments {
     /// Write a page with pictures; opens offline in any browser.
     #[arg(long, value_name = "FILE")]
     pub(crate) html: Option<PathBuf>,
-    /// Write a picture (SVG) for a text.
+    /// Write a picture (SVG) for a document.
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
 }
@@ -381,11 +381,11 @@ pub(crate) struct SendArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct BringupArguments {
-    /// Loop file; its [limits] have to say how large each input may be.
+    /// Loop file; its [limits] must give a maximum for each input.
     #[arg(value_name = "LOOP")]
     pub(crate) file: PathBuf,
-    /// What the motors are first driven with, in the unit of the inputs; by default a quarter of the
-    /// smallest limit.
+    /// Input of the first motions, in the unit of the inputs; by default a quarter of the smallest
+    /// limit.
     #[arg(long, value_name = "VOLTS")]
     pub(crate) volts: Option<f64>,
     /// How long a motor is driven at a time.

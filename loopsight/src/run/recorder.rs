@@ -13,7 +13,7 @@ use loopsight_report::{ControlledTrace, InnovationTrace, InputTrace, LoopRecord,
 use super::timing::Stopwatch;
 use crate::columns::rounded;
 
-/// Most ticks that are kept for the page; beyond it every second one is left out, again and again.
+/// Most ticks that are kept for the page; each time it is reached, every second one is dropped.
 const MOST_KEPT: usize = 200_000;
 
 /// Most events of one kind that are logged.
@@ -205,7 +205,7 @@ impl Recorder {
             self.happened(time, self.words(event));
         }
         let flags = [outcome.saturated, outcome.held];
-        let says = ["an actuator saturates", "the last safe command is held"];
+        let says = ["an actuator saturates", "the last safe command is repeated"];
         for kind in 0..2 {
             if flags[kind] && !self.was[kind] && self.alike[kind] < MOST_ALIKE {
                 self.alike[kind] += 1;

@@ -1,4 +1,4 @@
-//! How well a loop keeps to the clock on the wall.
+//! How well a loop keeps real time.
 
 use loopsight_core::TickRecord;
 use loopsight_report::Timing;

@@ -121,7 +121,7 @@ impl<'r> RunView<'r> {
         })
     }
 
-    /// Whether the controller wanted more than it could get.
+    /// Whether an input is saturated.
     pub fn saturated(&self) -> bool {
         self.step.outcome.saturated
     }

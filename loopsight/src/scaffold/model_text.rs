@@ -17,7 +17,7 @@ fn described(parameter: &Parameter) -> String {
     let fitted = if parameter.estimated {
         "a fit finds it"
     } else {
-        "held in a fit"
+        "frozen in a fit"
     };
     format!(
         "# {}, {}: {}; {}; {fitted}\n",

@@ -23,8 +23,8 @@ const INSTANT: f64 = 1e-5;
 impl Pace {
     /// Of `model` under the inputs `drive`.
     ///
-    /// The state is the one that is reached from 0 in one time constant, so that a plant which is
-    /// singular when empty (a tank) is looked at where it works; a few rounds agree on both.
+    /// The state is the one that is reached from 0 in one time constant, because a plant may be singular at 0 (an
+    /// empty tank). A few rounds find state and time constant together.
     pub(super) fn of(model: &Model, drive: &[f64]) -> Self {
         let mut pace = Self {
             fastest: 1.0,
@@ -46,7 +46,7 @@ impl Pace {
         rounded_down(0.2 * self.fastest).max(rounded_down(2.0 * self.duration() / most))
     }
 
-    /// How long an input is held: about until the slowest motion has settled, s.
+    /// How long an input stays constant: about until the slowest motion has settled, s.
     pub(super) fn hold(&self) -> f64 {
         rounded_down(5.5 * self.slowest)
     }

@@ -18,7 +18,7 @@ use crate::files::Reads;
 use crate::run::Loop;
 use crate::simulate::Experiment;
 
-/// Noise of a sensor over what its signal does while the inputs are held once.
+/// Noise of a sensor, over the change of its signal while the inputs stay constant once.
 const NOISE: f64 = 0.01;
 
 /// Makes the folder `target` for a robot of this plant.
@@ -93,9 +93,8 @@ fn simulate(model: &Model, text: &str, meta: &PlantMeta) -> Result<Run> {
     Experiment::from_toml(&file, text)?.simulate(model, &Reads::default())
 }
 
-/// What each measured signal does while the inputs are held once: the rms of its change over that
-/// time, over √2. Of a signal that comes to rest it is the standard deviation; of one that drifts
-/// away it is not the whole way.
+/// The change of each measured signal while the inputs stay constant once: its rms over √2. For a signal that comes
+/// to rest this is the standard deviation. For one that drifts it is less than the whole range.
 fn deviations(run: &Run, pace: Pace) -> Vec<f64> {
     let apart = ((pace.hold() / pace.period()) as usize).clamp(1, run.len().max(2) - 1);
     (0..run.n_measured())

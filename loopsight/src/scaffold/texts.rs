@@ -76,7 +76,7 @@ pub(super) fn loop_text(
     let mut text = format!(
         "# A loop: the controller knows model.toml, the robot is simulated from it.\n\
          name = {}\nmodel = \"model.toml\"\nperiod_s = {:?}\nduration_s = {:?}\nlog = \"loop.csv\"\n\n\
-         # In the place of the robot; a `model` of its own could hide what the controller's lacks.\n\
+         # In place of the robot; a `model` of its own could have what the controller's lacks.\n\
          [driver.simulated]\nstep_s = {:?}\nlimit = {driver}\nseed = 1\n\n\
          # `loopsight explain feedback_linearizing_pi` has all settings.\n\
          [controller.feedback_linearizing_pi]\nsettling_time_s = {:?}\nrule = \"exact\"\nlimit = {controller}\n",
@@ -132,7 +132,7 @@ pub(super) fn commands() -> [String; 3] {
 pub(super) fn readme_text(name: &str, meta: &PlantMeta, looped: bool) -> String {
     let mut text = format!(
         "# {name}\n\nA `{}`: {}.\n\n| file | what |\n|---|---|\n\
-         | `model.toml` | the robot as one believes it to be: every parameter with unit and range |\n\
+         | `model.toml` | the model of the robot: every parameter with unit and range |\n\
          | `experiment.toml` | what a simulated robot is driven with |\n",
         meta.id, meta.summary
     );

@@ -1,4 +1,4 @@
-//! A crate with a plant and an effect of its own, and the whole command around them.
+//! A crate with a plant and an effect of its own, and a command that has them.
 
 use std::path::{Path, PathBuf};
 
@@ -8,8 +8,7 @@ use loopsight_recordings::output::NewFolder;
 use super::Made;
 use crate::error::{Error, Result};
 
-/// Files of `examples/custom-plant`, which is built and tested as it stands: what is handed out
-/// here is what is known to work.
+/// Files of `examples/custom-plant`. That crate is built and tested, so a copy of it works.
 const FILES: [(&str, &str); 6] = [
     (
         "src/ship_heading.rs",
@@ -47,7 +46,7 @@ const COMMANDS: [&str; 3] = [
     "cargo run -- diagnose model.toml turns.csv --html why.html",
 ];
 
-/// Where this command was built: a room of a checkout, or a folder of cargo's for what was published.
+/// Where this command was built: a crate of a checkout, or cargo's folder of a published one.
 const BUILT_FROM: &str = env!("CARGO_MANIFEST_DIR");
 
 /// Where a new crate takes loopsight from.
@@ -225,7 +224,7 @@ fn readme(name: &str) -> String {
          | `src/norrbin_damping.rs` | the effect: damping of the hull with the cube of the yaw rate |\n\
          | `src/main.rs` | names both, and runs the command |\n\
          | `ship.toml` | the ship as it is, with the effect |\n\
-         | `model.toml` | what one believes of it, without the effect |\n\
+         | `model.toml` | the model of it, without the effect |\n\
          | `zigzag.toml`, `turns.toml` | what the ship is driven with |\n\n\
          The next three commands, in this folder; the first one builds for some minutes:\n\n\
          ```sh\n{}\n```\n\n\

@@ -1,4 +1,4 @@
-//! A new folder that comes into being whole or not at all.
+//! A new folder that is made whole or not at all.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use tempfile::TempDir;
 
 use super::{OutputError, Written, take_place};
 
-/// Files on their way into a new folder: they lie in a temporary one beside it until [`NewFolder::finish`].
+/// Files for a new folder. They lie in a temporary folder beside it until [`NewFolder::finish`].
 pub struct NewFolder {
     target: PathBuf,
     name: String,

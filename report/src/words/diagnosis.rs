@@ -104,7 +104,7 @@ fn effect_missing(diagnosis: &Diagnosis) -> (String, Vec<String>) {
 fn nothing_missing(diagnosis: &Diagnosis) -> (String, Vec<String>) {
     let because = vec![
         left(diagnosis),
-        "No effect of the library makes a difference that counts.".to_owned(),
+        "No effect of the library makes a significant difference.".to_owned(),
     ];
     ("Nothing is missing from the model.".to_owned(), because)
 }
@@ -113,7 +113,7 @@ fn unknown_effect(diagnosis: &Diagnosis) -> (String, Vec<String>) {
     let mut because = vec![left(diagnosis)];
     if let Some(nearest) = diagnosis.candidates.first() {
         because.push(format!(
-            "The best candidate is {}. It would leave {}: not enough to believe it.",
+            "The best candidate is {}. It would leave {}, which is not good enough.",
             place(&nearest.place),
             error(nearest.nrmse)
         ));

@@ -55,7 +55,7 @@ pub(crate) fn not_shown(model: &Model) -> Vec<String> {
             .map(|tie| format!("{} = {tie}", tie.parameter))
             .collect();
         format!(
-            "The log shows nothing of {}: {} were taken for it, as if {}.",
+            "The log does not show {}: {} were assumed, as if {}.",
             part.what,
             ties.join(" and "),
             part.because

@@ -62,7 +62,7 @@ pub struct Learned<'a> {
     pub start: f64,
     /// Its value at the end.
     pub value: f64,
-    /// Interval that holds the true value with 95 % confidence if the noise is white; `None` where nothing
+    /// Interval that contains the true value with 95 % confidence if the noise is white; `None` where nothing
     /// was learned.
     pub interval95: Option<[f64; 2]>,
 }

@@ -1,5 +1,4 @@
-//! What is seen while a loop runs: a few lines that are drawn again and again on a terminal, one line
-//! a second anywhere else.
+//! What is shown while a loop runs: a few lines that are redrawn on a terminal, or one line a second elsewhere.
 
 use std::time::{Duration, Instant};
 
@@ -41,8 +40,7 @@ impl Dashboard {
         }
     }
 
-    /// Takes a tick; draws when it is time to. What cannot be drawn is not drawn: a loop does not stop
-    /// because nobody can look at it.
+    /// Takes a tick; draws when it is time to. A loop does not stop because something cannot be drawn.
     pub(super) fn take(&mut self, view: &RunView<'_>) {
         for (i, input) in view.inputs().enumerate() {
             match self.largest.get_mut(i) {
@@ -70,7 +68,7 @@ impl Dashboard {
         let _ = self.term.flush();
     }
 
-    /// Takes the picture away: what comes next is written in its place.
+    /// Clears the picture: what comes next is written in its place.
     pub(super) fn clear(&mut self) -> std::io::Result<()> {
         if self.drawn > 0 {
             self.term.clear_last_lines(self.drawn)?;

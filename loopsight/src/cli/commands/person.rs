@@ -15,7 +15,7 @@ pub(super) struct Terminal {
 impl Terminal {
     pub(super) fn new() -> Self {
         let (say, hear) = channel();
-        // It ends with the process, or when nobody listens any more.
+        // It ends with the process, or when the receiver is gone.
         std::thread::spawn(move || {
             for line in std::io::stdin().lock().lines() {
                 let Ok(line) = line else { return };
