@@ -16,8 +16,8 @@ pub(crate) struct AtRest {
     pub(crate) n: usize,
     /// `G` at rest, row by row.
     pub(crate) matrix: Vec<f64>,
-    /// `-∂f_i/∂y_i`, 1/s, of what grows with the state: the least chord around rest, so that what only
-    /// has a sign (dry friction) does not pass for damping, which a controller would take away.
+    /// Damping `-∂f_i/∂y_i`, 1/s: the least slope of a chord around rest. Dry friction, which has only a sign, does not
+    /// count as damping, because a controller would cancel it.
     pub(crate) damping: Vec<f64>,
     /// Sizes of the controlled states.
     pub(crate) sizes: Vec<f64>,

@@ -4,8 +4,8 @@ use loopsight_core::{Command, Real};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OVector};
 
-/// What every law here does with its command: each input is clipped by itself, as an amplifier does it, and
-/// the last command is kept for when none can be computed.
+/// Clips the command of a law, each input by itself, as an amplifier does. It keeps the last command for ticks at
+/// which none can be computed.
 #[derive(Clone, Debug)]
 pub(crate) struct Clipped<S: Real, D: Dim>
 where

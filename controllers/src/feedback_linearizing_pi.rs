@@ -34,10 +34,10 @@ pub use settings::FeedbackLinearizingPiSettings;
 /// | `k_p`, `k_i`, `β` | gains and reference weight of [`SampledPi`] | 1/s, 1/s², 1 |
 /// | `T` | period | s |
 ///
-/// **The period.** The input is held over the period while the drift is not: linearised at the
-/// start of the period, a robot with a damping of 15 s⁻¹ falls short of `ν` by 7 % at 100 Hz. At
-/// the middle `ȳ` of the period, where `y` will be if `y' = ν` (the implicit midpoint rule), the
-/// shortfall is `(A T)²/12`, 0.2 %, for one evaluation of the model all the same. What is left is
+/// **The period.** The input is constant over the period, but the drift is not: linearised at the
+/// start of the period, a robot with a damping of 15 s⁻¹ falls short of `ν` by 7 % at 100 Hz. So `f` and `G`
+/// are taken at the middle `ȳ` of the period, where `y` will be if `y' = ν` (the implicit midpoint rule). The
+/// shortfall is then `(A T)²/12`, 0.2 %, and the model is still evaluated only once. What is left is
 /// `y_{k+1} = y_k + T ν_k`, for which [`SampledPi`] equals `H(s)` at every sample.
 ///
 /// **Feedforward.** With [`FeedbackLinearizingPi::feeding_forward`] the rate of the reference is added
@@ -49,12 +49,12 @@ pub use settings::FeedbackLinearizingPiSettings;
 /// the reference had been the one that the clipped inputs can follow, so it cannot wind up.
 ///
 /// **When no command can be computed** (a measurement or reference that is not a number, a model
-/// that became singular while it was being learned) the last command is held, the integral waits,
-/// and [`Command::held`] says so.
+/// that became singular while it was being learned) the last command is repeated, the integral stays,
+/// and [`Command::held`] is true.
 ///
-/// **Effects** in the model file are in `f`, `G` and `E`: friction, drag, gravity, dead zone, sag and
-/// the like are compensated with nothing about them said here; delays and lags are predicted over.
-/// [`loopsight_core::AffineModel`] says how, and the notes of a loop what of it applies.
+/// **Effects** in the model file are in `f`, `G` and `E`. So friction, drag, gravity, dead zone, sag and
+/// the like are compensated without any setting here, and delays and lags are predicted over.
+/// [`loopsight_core::AffineModel`] describes how; the notes of a loop list what of it applies.
 ///
 /// Assumptions: as many inputs as controlled states, `G` invertible, measurements without delay but
 /// for what the model predicts over (a velocity taken from encoder counts is the mean over the last

@@ -38,12 +38,12 @@ pub use settings::MracSettings;
 /// price of a small error at rest. The normalisation keeps the rate of adaptation from growing with the
 /// signals, in single precision, too.
 ///
-/// **Clipped inputs** tell nothing about the gains where the plant is behind the reference model: the
-/// plant takes it along, so that it asks for nothing that cannot be done. Where the inputs are clipped
-/// and drive the plant away from the reference model, the gains are wrong and adapt.
+/// **Clipped inputs** tell nothing about the gains where the plant is behind the reference model. The
+/// reference model is then set to the plant, so that it never demands the impossible. Where the inputs are
+/// clipped and drive the plant away from the reference model, the gains are wrong and adapt.
 ///
-/// **When no command can be computed** the last one is held, everything waits, and
-/// [`Command::held`] says so.
+/// **When no command can be computed** the last one is repeated, all states stay, and
+/// [`Command::held`] is true.
 ///
 /// Assumptions: each demand moves mostly its own state, the sign of `g` is known and its size within
 /// a factor of a few; the plant answers as one of first order.

@@ -34,8 +34,8 @@ pub use settings::PidSettings;
 /// touching how disturbances are. The integral is tracked back by what the clipped inputs lack, so it
 /// does not wind up. Integral forward, derivative backward: stable for every `T_f`.
 ///
-/// **When no command can be computed** the last one is held, the integral waits, and
-/// [`Command::held`] says so.
+/// **When no command can be computed** the last one is repeated, the integral stays, and
+/// [`Command::held`] is true.
 ///
 /// Assumptions: each demand moves mostly its own state; nothing of the model is used but the
 /// directions in `M`.

@@ -6,7 +6,7 @@ use crate::PiResponse;
 ///
 /// ```text
 /// ν_k = k_p (β r_k - u_k) + z_k          z_{k+1} = z_k + k_i T (r_k - u_k)
-/// u_{k+1} = u_k + T ν_k                  (the linearised plant under a held ν)
+/// u_{k+1} = u_k + T ν_k                  (the linearised plant under a constant ν)
 /// ```
 ///
 /// gives `(k_p β T (z-1) + k_i T²)/((z-1)² + k_p T (z-1) + k_i T²)`. The poles are those of `H`

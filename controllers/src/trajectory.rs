@@ -29,7 +29,7 @@ pub use settings::TrajectorySettings;
 /// | `k_x` | forward gain | 1/s |
 /// | `k_y`, `k_θ` | lateral gain, heading gain | 1/m², 1/m |
 ///
-/// With a velocity loop that does what it is asked, `½(e_x² + e_y²) + (1 - cos e_θ)/k_y` never grows
+/// With an ideal velocity loop, `½(e_x² + e_y²) + (1 - cos e_θ)/k_y` never grows
 /// (`-k_x e_x² - v_r k_θ sin² e_θ/k_y` is its rate). On a straight line lateral errors obey
 /// `s² + k_θ s + k_y` by the way driven: `k_θ = 2 √k_y` is critical damping, and `1/√k_y` the way in which
 /// an error decays.

@@ -9,11 +9,11 @@ use crate::{Observation, Real, Sample, Tick};
 pub struct Command {
     /// At least one actuator was asked for more than it can give.
     pub saturated: bool,
-    /// The command is the last safe one, held because no better could be computed.
+    /// The command is the last safe one, repeated because no new one could be computed.
     pub held: bool,
 }
 
-/// Something that a controller tells beside its commands: what it learned itself, what it measured.
+/// A quantity that a controller reports beside its commands: something that it learned or measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity<S> {
     /// Its name.
@@ -30,9 +30,9 @@ pub struct Quantity<S> {
 pub enum ControlError {
     /// Slices of other lengths than those the controller was built for.
     Sizes,
-    /// What computes the commands elsewhere, aboard a robot, does not answer.
+    /// The robot that computes the commands itself does not answer.
     NoAnswer,
-    /// What computes the commands elsewhere has come to rest; its reason.
+    /// The robot that computes the commands itself has come to rest; its reason.
     AtRest(&'static str),
 }
 
@@ -50,9 +50,9 @@ impl core::error::Error for ControlError {}
 
 /// A plant seen by a controller: `dy/dt = f(y) + G(y) u` for the controlled states `y`.
 ///
-/// `u` are the inputs at the plant. What lies between a command and them (a dead zone, a supply that
-/// sags) is inverted by [`AffineModel::invert`]; what makes commands or measurements late is made up
-/// for by [`AffineModel::track`]. A model without any of that implements the first two methods only.
+/// `u` are the inputs at the plant. [`AffineModel::invert`] inverts what lies between a command and them, such as a
+/// dead zone or a supply that sags. [`AffineModel::track`] compensates delays of commands and measurements. A model
+/// with neither implements only the first two methods.
 pub trait AffineModel<S: Real> {
     /// Number of controlled states, equal to the number of inputs.
     fn size(&self) -> usize;
@@ -69,8 +69,8 @@ pub trait AffineModel<S: Real> {
             self.learn(parameter, *value);
         }
     }
-    /// Says where the controlled states are wanted: what depends on the direction of a motion that
-    /// has hardly begun (dry friction) is taken in that direction, until the next call.
+    /// Sets where the controlled states are wanted, until the next call. Effects that depend on the direction of a
+    /// motion that has hardly begun (dry friction) are evaluated in the wanted direction.
     fn aim(&mut self, wanted: &[S]) {
         let _ = wanted;
     }
@@ -80,18 +80,17 @@ pub trait AffineModel<S: Real> {
         let _ = (y, input);
         true
     }
-    /// Replaces commands by what they come to at the plant at `y`: the other way round.
+    /// Replaces commands by the inputs that they cause at the plant at `y`: the inverse of [`AffineModel::invert`].
     fn pass(&mut self, y: &[S], command: &mut [S]) {
         let _ = (y, command);
     }
-    /// Time from now until the plant feels a command that is written now, s: references that are known
-    /// before their time should be asked for that much earlier.
+    /// Delay until a command that is written now acts on the plant, s. References that are known in advance should be
+    /// given to the controller that much earlier.
     fn ahead(&self) -> S {
         S::zero()
     }
-    /// Takes what happened since the tick before. `controlled` holds the controlled states as
-    /// measured; it is replaced by the states that the next command will meet, where the model knows
-    /// better.
+    /// Takes what happened since the tick before. `controlled` are the controlled states as measured. A model that
+    /// predicts replaces them by the states at the time when the next command acts.
     ///
     /// The loop calls it before every step of the controller, after [`AffineModel::learn`]; at the
     /// first tick nothing was asked for or applied before.
@@ -119,8 +118,8 @@ pub trait Controller<S: Real>: Send {
     fn sampled(&mut self, sample: &Sample<S>) {
         let _ = sample;
     }
-    /// Replaces the loop's references by those of the last step, where the controller makes its own
-    /// (it follows a path): what was tracked, for logs and whoever watches over the loop.
+    /// Replaces the loop's references by those of the last step, where the controller makes its own (it follows a
+    /// path). Logs and the supervisor need them.
     fn demand(&self, reference: &mut [S]) {
         let _ = reference;
     }
@@ -132,7 +131,7 @@ pub trait Controller<S: Real>: Send {
     fn told(&self) -> &[S] {
         &[]
     }
-    /// What there is to say of the last step beyond its result: why it failed, what happened meanwhile.
+    /// Remarks on the last step: why it failed, what happened meanwhile.
     fn remark(&self) -> Option<&str> {
         None
     }

@@ -1,10 +1,9 @@
 //! Quantities that follow from a plant's parameters.
 
-/// A quantity that follows from the parameters of a plant's equations: the same model in the words of
-/// another school, a time constant, a gain at rest.
+/// A quantity that follows from the parameters of a plant's equations: a parameter of another form of the model, a
+/// time constant, a static gain.
 ///
-/// It is shown beside the parameters, with the interval that follows from theirs; nothing is
-/// configured by it.
+/// It is shown beside the parameters, with an interval that is propagated from theirs. It configures nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derived {
     /// Identifier in JSON and reports, e.g. `kV`.

@@ -9,8 +9,7 @@ use crate::Real;
 pub struct Sample<S> {
     /// When it was taken, s since the driver started.
     pub time: S,
-    /// False when the values are older than the tick that reads them: they must not teach an
-    /// estimator anything.
+    /// False when the values are older than the tick that reads them. An estimator must not learn from them.
     pub fresh: bool,
 }
 

@@ -42,8 +42,8 @@ pub trait Estimator<S: Real>: Send {
     }
     /// The estimate.
     fn theta(&self) -> &[S];
-    /// The covariance of two of its entries relative to the variance of the measurement noise; NaN where
-    /// the method has none. Computed when it is asked for: a tick does not pay for what nobody looks at.
+    /// The covariance of two of its entries relative to the variance of the measurement noise; NaN where the method
+    /// has none. It is computed on request, and costs a tick nothing.
     fn covariance(&self, row: usize, column: usize) -> S;
     /// All of it, column by column; `into` has the square of the estimate's length.
     fn covariance_into(&self, into: &mut [S]) {
@@ -52,8 +52,8 @@ pub trait Estimator<S: Real>: Send {
             *entry = self.covariance(k % n, k / n);
         }
     }
-    /// Moves the estimate and leaves the covariance as it is: who guards the estimator holds it in
-    /// range by this. Ignored unless `theta` has the right length and is finite.
+    /// Moves the estimate and leaves the covariance as it is. A guard uses it to keep the estimate in range. Ignored
+    /// unless `theta` has the right length and is finite.
     fn set_theta(&mut self, theta: &[S]);
     /// Starts over from `theta` with the initial covariance.
     fn reset(&mut self, theta: &[S]);

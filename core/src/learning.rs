@@ -1,4 +1,5 @@
-//! What keeps an estimator out of harm: the same for every estimator, on a desk and on a robot.
+//! Guards of an estimator: excitation, dead zone, projection. They are the same for every estimator, on a desk and on
+//! a robot.
 
 mod excitation;
 mod guarded;

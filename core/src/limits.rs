@@ -10,7 +10,7 @@ use crate::Real;
 ///
 /// | symbol | what | unit |
 /// |---|---|---|
-/// | `u`, `u_k` | what is wanted, what is let through | of the signal |
+/// | `u`, `u_k` | wanted value, clamped value | of the signal |
 /// | `m` | largest magnitude | of the signal |
 /// | `r` | largest rate | of the signal per s |
 /// | `T` | period | s |
@@ -45,8 +45,8 @@ impl<B> Limits<B> {
         }
     }
 
-    /// Clamps `values`, `period` s after the last ones; true when one of them was changed. A value that is
-    /// not a number is let through: a driver has to see and refuse it.
+    /// Clamps `values`, `period` s after the last ones; true when one of them was changed. NaN passes unchanged: the
+    /// driver has to refuse it.
     pub fn clamp<S: Real>(&mut self, period: S, values: &mut [S]) -> bool
     where
         B: AsRef<[S]> + AsMut<[S]>,
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Whatever is asked for, magnitude and rate are kept, and what is within them is untouched.
+        /// Magnitude and rate never exceed the limits, and values within them are unchanged.
         #[test]
         fn nothing_leaves_its_limits(
             wanted in proptest::collection::vec(-100.0..100.0f32, 1..60),

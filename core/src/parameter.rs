@@ -26,16 +26,16 @@ pub struct Parameter {
     pub max: f64,
     /// True when `min` and `max` themselves are not admissible.
     pub open: bool,
-    /// A control law divides by it: an estimate does not come near zero, and keeps its sign. A value
-    /// of zero is admissible all the same: a machine without that drive.
+    /// A control law divides by it, so an estimate keeps its sign and stays away from zero. The value zero is still
+    /// admissible: a machine without that drive.
     pub nonzero: bool,
     /// Value when the file gives none; `None` makes the parameter obligatory, unless a fit is to
     /// find it.
     pub default: Option<f64>,
     /// A fit estimates it unless told otherwise. Geometry that was measured with a ruler is not.
     pub estimated: bool,
-    /// Enters the right-hand side linearly (the others of its kind held): it can be identified by
-    /// linear regression.
+    /// Enters the right-hand side linearly while the others of its kind are constant: linear regression can identify
+    /// it.
     pub linear: bool,
     /// Size of a noticeable change, in the parameter's unit: scales a fit when the value is zero.
     pub scale: f64,
@@ -43,8 +43,8 @@ pub struct Parameter {
     pub starts: &'static [f64],
     /// `starts` are fractions of the duration of the recording.
     pub starts_in_durations: bool,
-    /// Sides on which it acts, see [`crate::Channel::side`]; empty: everywhere. Where an effect is
-    /// attached to none of them a fit holds it.
+    /// Sides on which it acts, see [`crate::Channel::side`]; empty: everywhere. Where an effect is attached to none of
+    /// them, it is frozen in a fit.
     pub sides: &'static [i8],
 }
 
@@ -109,7 +109,7 @@ impl Parameter {
         self
     }
 
-    /// Held at its value in a fit, unless the model file frees it.
+    /// Frozen at its value in a fit, unless the model file frees it.
     pub const fn known(mut self) -> Self {
         self.estimated = false;
         self

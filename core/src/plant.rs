@@ -1,4 +1,4 @@
-//! Plants: the static view authors write, and the object-safe view made from it.
+//! Plants: the trait that authors implement, and the object-safe trait that is made from it.
 
 use crate::{Array, Channel, Derived, Parameter, Place, Real, Signal, Unshown};
 
@@ -73,7 +73,7 @@ impl PlantMeta {
     }
 }
 
-/// Another set of parameters from which those of the equations follow.
+/// Another set of parameters, from which those of the equations are computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameterization {
     /// Name of the sub-table in TOML, e.g. `physical`.
@@ -233,8 +233,8 @@ pub trait ControlAffine: Plant {
 pub trait Dynamics<S: Real>: Send + Sync {
     /// `dx = f(x, u, w; p)`.
     fn derivative(&self, x: &[S], u: &[S], w: &[S], p: &[S], dx: &mut [S]);
-    /// One step `h` (s) of the plant alone by [`Rk4`](crate::Rk4), inputs and efforts held: what
-    /// that does with [`Dynamics::derivative`], to the last digit, without a call per stage.
+    /// One step `h` (s) of the plant alone with constant inputs and efforts. The result is exactly that of
+    /// [`Rk4`](crate::Rk4) with [`Dynamics::derivative`], but without a call per stage.
     fn step(&self, x: &mut [S], h: S, u: &[S], w: &[S], p: &[S]);
     /// `h_index(x, u; p)`; zero for slices of other lengths.
     fn output(&self, index: usize, x: &[S], u: &[S], p: &[S]) -> S;

@@ -25,9 +25,9 @@ const Q: [f32; 5] = [
 /// 1.2e-7, half of what rounding adds (found by Remez' exchange in 60 digits). The range ends where both together
 /// still stay below 1.
 ///
-/// It stands in for `tanhf` of a library because friction asks for it once per wheel and regression in every
-/// tick of a microcontroller: by way of `expm1` that is more than twice as many instructions as this, which is nothing
-/// but sums, products and one quotient, and so has the same digits on every machine.
+/// It replaces the library's `tanhf`, because friction needs it once per wheel and regression in every tick of a
+/// microcontroller. The library's, by way of `expm1`, takes more than twice as many instructions. This one has only
+/// sums, products and one quotient, so it gives the same digits on every machine.
 ///
 /// Reference: E. Y. Remez (1934), "Sur le calcul effectif des polynômes d'approximation de Tchebichef",
 /// Comptes rendus 199, 337–340; E. W. Cheney (1966), "Introduction to Approximation Theory", ch. 5 (rational

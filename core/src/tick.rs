@@ -6,7 +6,7 @@ use crate::{
     Clock, Command, ControlError, Controller, Driver, DriverError, Innovation, Limits, Real, Sample,
 };
 
-/// Where in time a controller is.
+/// The time of a tick, for a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick<S> {
     /// Number of this tick, from 0.
@@ -49,14 +49,14 @@ pub trait Observer<S: Real> {
         let _ = model;
     }
 
-    /// What the last observation told the `row`-th regression that was not expected; `None` where
-    /// there was nothing to learn, or no such regression.
+    /// The innovation of the `row`-th regression at the last observation; `None` where there was nothing to learn, or
+    /// no such regression.
     fn innovation(&self, row: usize) -> Option<Innovation<S>> {
         let _ = row;
         None
     }
 
-    /// What other values of the model's parameters would have left unexplained of the same.
+    /// The innovation that other values of the model's parameters would have had.
     fn residual(&self, row: usize, values: &[S]) -> Option<S> {
         let _ = (row, values);
         None
@@ -121,8 +121,8 @@ impl<E: DriverError, S> TickError<E, S> {
 /// A control loop composed of a driver, a controller, a model of the plant, an observer that
 /// learns, and a clock.
 ///
-/// `B` is the buffer type: `[S; N]` without an allocator, `Vec<S>` on a host. `W` watches over it: a
-/// [`Supervisor`](crate::supervisor::Supervisor), or nobody. The loop allocates nothing after it was built.
+/// `B` is the buffer type: `[S; N]` without an allocator, `Vec<S>` on a host. `W` is a
+/// [`Supervisor`](crate::supervisor::Supervisor), or none. The loop allocates nothing after it was built.
 #[derive(Debug)]
 pub struct Loop<S, D, C, M, O, K, B, W = ()> {
     /// What stands between the loop and the robot.
@@ -174,7 +174,7 @@ pub struct TickRecord<'a, S> {
     pub command: &'a [S],
     /// What the driver applied.
     pub applied: &'a [S],
-    /// What the controller says of it; saturated also where the loop's own limits held an input.
+    /// The controller's remark on it; saturated also where the loop's own limits clamped an input.
     pub outcome: Command,
     /// What the supervisor did at this tick.
     pub event: Option<Event<S>>,
@@ -281,7 +281,7 @@ where
         self.period
     }
 
-    /// Waits for the next period, then reads, learns, judges and teaches, controls and writes.
+    /// Waits for the next period, then reads, learns, supervises, controls and writes.
     ///
     /// On any error the driver has been stopped safely when this returns.
     pub fn tick(&mut self, reference: &[S]) -> Result<TickRecord<'_, S>, TickError<D::Error, S>> {

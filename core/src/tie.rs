@@ -1,13 +1,13 @@
-//! What a plant says of the parameters that a recording may not show.
+//! Ties: what a plant declares of parameters that a recording may not show.
 
 use crate::Real;
 
 /// A part of a plant that shows only when its inputs are combined in one way, and what its parameters are
 /// likely to be where they never are.
 ///
-/// A vehicle that only drives straight says nothing of how it turns. Left free, the turning half takes
-/// any value, and friction at one wheel does as well as friction at both. Tied to the straight half it is
-/// that of a vehicle whose sides are alike and do not feel each other.
+/// A recording of a vehicle that only drives straight does not show how it turns. Left free, the parameters of
+/// turning take any value, and friction at one wheel fits as well as friction at both. Tied, they follow from the
+/// parameters of driving straight, for a vehicle with equal sides that do not act on each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unshown {
     /// What it is, in words: `turning`.

@@ -2,8 +2,8 @@
 //!
 //! A [`Unit`] is a factor and a [`Dimension`]: *SI value = factor × value*. The radian keeps an
 //! exponent of its own, so that `rad/s` and `1/s` differ: a column in hertz is not taken for an
-//! angular velocity. Turns (`rev`, `rot`, `deg`, `rpm`) are angles; a `count` is a plain number,
-//! since how far one count turns is the encoder's business.
+//! angular velocity. Turns (`rev`, `rot`, `deg`, `rpm`) are angles. A `count` is a plain number, since
+//! the angle of one count depends on the encoder.
 //!
 //! ## Grammar
 //!

@@ -1,4 +1,4 @@
-//! What goes wrong with the sensors of a simulated robot, and when.
+//! Faults of the sensors of a simulated robot.
 
 use loopsight_model::registry::BuildError;
 use rand::{RngExt, SeedableRng};

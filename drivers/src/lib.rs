@@ -1,7 +1,7 @@
 //! Drivers: what stands between a control loop and a robot.
 //!
-//! A driver reads a sample, writes a command, and says what was applied: an estimator must learn from what the
-//! plant saw. Each implements [`loopsight_core::Driver`].
+//! A driver reads a sample, writes a command, and returns what was applied, because an estimator must learn from
+//! the inputs that the plant had. Each implements [`loopsight_core::Driver`].
 //!
 //! | driver | what | where |
 //! |---|---|---|

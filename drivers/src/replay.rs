@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// which a sample is not fresh.
 const LATE: f64 = 0.5;
 
-/// A recording as the robot: an estimator sees again what it would have seen on the robot.
+/// A recording as the robot: an estimator gets the samples that it would have had on the robot.
 ///
 /// ```text
 /// read:  y = measured[k], t = time[k] - time[0], then k <- k + 1

@@ -96,7 +96,7 @@ impl Robot {
     }
 
     /// What the sensors read now; at the very first reading there is no interval to take a mean
-    /// over, and the value is the instantaneous one. False when the robot left the finite numbers.
+    /// over, and the value is the instantaneous one. False when the simulation has diverged.
     pub(crate) fn measure(&mut self, measured: &mut [f64]) -> bool {
         let simulator = &mut self.simulator;
         simulator.measure(measured);

@@ -1,4 +1,4 @@
-//! A covariance that stays one: `P = U D Uᵀ`.
+//! A covariance that stays positive definite: `P = U D Uᵀ`.
 
 use core::cmp::Ordering;
 

@@ -10,9 +10,9 @@
 //! | [`Kalman`] | a Kalman filter for parameters that walk at random | parameters drift, each on its own |
 //! | [`Lms`] | normalised least mean squares with leakage | every instruction counts |
 //!
-//! Each implements [`loopsight_core::Estimator`]. What keeps an estimator out of harm is written once for all of
-//! them, in [`loopsight_core::learning::Guarded`]: scales, ranges, a dead zone, and freezing where nothing is
-//! excited. Here a gain and a damping are learned under that guard:
+//! Each implements [`loopsight_core::Estimator`]. [`loopsight_core::learning::Guarded`] guards any of them with
+//! scales, ranges, a dead zone, and freezing where nothing is excited. Here a gain and a damping are learned under
+//! that guard:
 //!
 //! ```
 //! use loopsight_core::learning::{Guarded, Guards, Range};

@@ -28,9 +28,9 @@ const WINDOW: f64 = 100.0;
 /// | `ε` | keeps the step small where every regressor is | of `φᵀφ` |
 /// | `γ` | leakage per sample, in [0, 1): pulls back to the start what nothing excites | 1 |
 ///
-/// A sample with less than the mean power teaches less by so much: what the model lacks (friction, a count of an
-/// encoder) does not shrink with the regressor, and over its own power it would count for the more the less there
-/// is to learn from.
+/// A sample with less than the mean power counts less by that ratio. Errors of the model (friction, a count of an
+/// encoder) do not shrink with the regressor. Divided by the sample's own power, they would count most where there is
+/// least to learn.
 ///
 /// The cheapest estimator there is: `2n` multiplications, no matrix. It converges slowly where the
 /// regressors are of different sizes or alike; the loop's scaling of parameters helps with the first

@@ -1,4 +1,4 @@
-//! What a host and a robot say to each other over a serial line: messages, frames, a handshake.
+//! The protocol between a host and a robot on a serial line: messages, frames, a handshake.
 //!
 //! [`encode`] makes a frame of a message. A [`Decoder`] takes bytes as they come and finds the messages in them:
 //!
@@ -26,9 +26,9 @@
 //! frame = COBS(postcard(message) + CRC-32C) + 0x00
 //! ```
 //!
-//! A zero byte ends every frame and occurs nowhere else. Whoever joins in the middle, or lost bytes, is in step
-//! again with the next frame. COBS notices no flipped bit; the checksum does. A frame whose checksum is wrong is
-//! dropped.
+//! A zero byte ends every frame and occurs nowhere else. A receiver that starts in the middle, or lost bytes, is
+//! synchronous again with the next frame. COBS does not detect a flipped bit; the checksum does. A frame whose
+//! checksum is wrong is dropped.
 //!
 //! **Conversation.** Each side speaks when spoken to. Only a robot with sensors of its own speaks by itself.
 //!

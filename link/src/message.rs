@@ -20,7 +20,7 @@ pub type Values = Vec<f32, PARAMETERS>;
 pub enum Request {
     /// The greeting; the first of all messages in all versions.
     Hello(Hello),
-    /// How the loop is to be.
+    /// The configuration of the loop.
     Configure {
         /// Number of the session.
         session: u32,
@@ -141,9 +141,8 @@ pub enum Note {
     Dropped(u32),
     /// The robot was reset and waits for a greeting.
     Started,
-    /// Said by a host on behalf of the robot that it runs: the robot drives, and goes on with what it is
-    /// told.
+    /// From a host on behalf of the robot that it runs: the robot drives, and goes on with what was sent.
     Runs,
-    /// Said by a host that speaks with another visitor: come again later.
+    /// From a host that talks to another program: try again later.
     Busy,
 }

@@ -1,4 +1,4 @@
-//! Why a robot stopped, or would not begin.
+//! Reasons why a robot stopped, or refused to begin.
 
 use core::fmt;
 

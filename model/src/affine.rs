@@ -24,7 +24,7 @@ pub use treatment::Treatment;
 ///
 /// ```text
 /// f(y)   = F(x, 0, w(x̄))      G(y) e_j = F(x, e_j, w(x̄)) - f(y)      F: plant, then effects on rates
-/// x̄ = x, but for its controlled states  ȳ = y + (r - y held within ±band)
+/// x̄ = x, but for its controlled states  ȳ = y + clamp(r - y, -band, band)
 /// E(V)   = V + Σ effects on inputs      invert: the V of least size with E(V) = u
 /// ```
 ///
@@ -32,19 +32,19 @@ pub use treatment::Treatment;
 /// |---|---|---|
 /// | `x`, `y` | state of the plant, its controlled states | of the signals |
 /// | `r` | where `y` is wanted, see [`AffineModel::aim`] | of `y` |
-/// | `band` | change of `y` from rest over which sign-like effects have grown up | of `y` |
+/// | `band` | change of `y` from rest at which sign-like effects have their full size | of `y` |
 /// | `w` | efforts of the effects | of the channels |
 /// | `V`, `u` | commands, inputs at the plant | of the inputs |
 ///
-/// No effect is known here: which of them can be compensated is found by trying them
-/// ([`Affine::treatments`]), and how they act by evaluating them.
+/// No effect is treated by its name. Evaluating them shows which can be compensated
+/// ([`Affine::treatments`]) and how they act.
 ///
 /// **Direction.** Dry friction has a sign, and near rest the sign of a measured speed is that of its
-/// noise: a controller that compensated that would chatter, and would not help a robot that sticks.
-/// So efforts are evaluated where the motion is wanted, `r`, or, where that is far, a `band` from
-/// `y` towards it. At rest this is the direction the robot is to move in; on the way, the direction
-/// it moves in; at the reference, that of the reference, without noise. `band` is found from the
-/// effects themselves (`direction.rs`), and is 0 where none of them has a sign.
+/// noise. A controller that compensated that would chatter, and would not help a robot that sticks.
+/// So efforts are evaluated at the wanted state `r`, or at most a `band` from `y` towards it. At rest
+/// this has the direction in which the robot is to move; on the way, the direction in which it moves;
+/// at the reference, that of the reference, without noise. `band` is found from the effects
+/// (`direction.rs`), and is 0 where none of them has a sign.
 ///
 /// **Delay.** [`Affine::predicting`] adds a predictor of the state that the next command will meet.
 ///
@@ -160,13 +160,13 @@ impl Affine {
         &self.treatments
     }
 
-    /// For each controlled state the change from rest over which what efforts depend on its sign has
-    /// grown up, in its unit; 0 where nothing does. For who compensates friction elsewhere.
+    /// For each controlled state the change from rest at which efforts that depend on its sign have their full size,
+    /// in its unit; 0 where none does. For controllers that compensate friction themselves.
     pub fn bands(&self) -> &[f64] {
         &self.bands
     }
 
-    /// Makes everything follow from values that changed.
+    /// Updates everything that depends on values that changed.
     fn use_learned(&mut self) {
         if !std::mem::take(&mut self.learned) {
             return;
@@ -220,7 +220,7 @@ impl Affine {
         }
     }
 
-    /// What the commands come to at the plant, in place.
+    /// Replaces the commands by the inputs that they cause at the plant.
     fn effective(&mut self, command: &mut [f64]) {
         if self.bounds.inputs.is_empty() {
             return;

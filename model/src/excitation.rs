@@ -1,7 +1,7 @@
 //! What a robot is excited with, as TOML: inputs of an experiment, references of a loop.
 //!
-//! It lives beside the roles because both sides need it: a loop file names references, a
-//! simulation and an advised experiment name inputs, and those rooms cannot see each other.
+//! It is in this crate because loops, simulations and experiments all need it, and their crates do not
+//! depend on each other.
 //!
 //! ```toml
 //! [inputs]

@@ -131,8 +131,8 @@ impl Identification {
         self.rows[row].lesson
     }
 
-    /// Plain statements, for reports: which of the parameters that a fit would estimate in `model` are
-    /// not learned here, and why; which effects are not reckoned with.
+    /// Sentences for reports: which parameters that a fit would estimate in `model` are not learned here, and why;
+    /// which effects are left out.
     pub fn notes(&self, model: &Model) -> Vec<String> {
         let free = model.parameters.iter().enumerate().filter(|(_, p)| p.free);
         free.filter(|(j, _)| !self.learned.contains(j))
@@ -164,8 +164,8 @@ impl Identification {
         &self.learned
     }
 
-    /// Brings the estimates together. What several rows estimate is the mean of what they found, each
-    /// weighted with the inverse of its variance; where a row knows none, alike.
+    /// Combines the estimates. A parameter that several rows estimate gets their mean, weighted with the inverse
+    /// variances, or unweighted where a row has no variance.
     fn gather(&mut self) {
         for &j in &self.learned {
             let (mut mean, mut weights) = (0.0, 0.0);
@@ -176,7 +176,7 @@ impl Identification {
                     let weight = (deviation * deviation).recip();
                     let weight = if weight.is_normal() { weight } else { 1e-12 };
                     weights += weight;
-                    // Not a digit of what a single row says is lost.
+                    // The estimate of a single row stays exactly as it is.
                     mean += weight / weights * (of.estimator.theta()[k] - mean);
                 }
             }

@@ -8,7 +8,7 @@ use crate::config::nearest;
 use crate::registry::BuildError;
 use loopsight_core::{Limits, Signal};
 
-/// How large an input or the reference of a controlled signal may be, and how fast it may change.
+/// Maximum and maximum rate of an input, or of the reference of a controlled signal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SignalLimits {

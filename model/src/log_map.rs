@@ -93,8 +93,8 @@ pub struct Column {
 /// How an input runs between the samples of a log (A. V. Oppenheim, R. W. Schafer, 2010,
 /// "Discrete-Time Signal Processing", 3rd edition, section 4.2).
 ///
-/// A command that a computer puts out is a staircase. An input that was *measured*, or a smooth
-/// reference, is not: to take it for one is to find half a sample of delay in a perfect model.
+/// A computer's command is constant between samples. An input that was *measured*, or a smooth reference, is not: if
+/// it is taken as constant, even a perfect model seems to have half a sample of delay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Hold {

@@ -34,7 +34,7 @@ impl Rows {
     }
 }
 
-/// Why measurements are no run.
+/// Why measurements do not form a run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RunError {
     /// A time stamp is NaN or infinite.

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 /// What lies between a signal of the plant and the number in the log.
 ///
-/// A velocity that is the difference of two encoder counts is the *mean* over the last period: to
-/// compare it with an instantaneous velocity is to find half a sample of delay in a perfect model.
+/// A velocity that is the difference of two encoder counts is the *mean* over the last period. Compared with an
+/// instantaneous velocity, even a perfect model seems to have half a sample of delay.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sensor {

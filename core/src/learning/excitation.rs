@@ -1,4 +1,4 @@
-//! How much a stream of regressors tells, direction by direction.
+//! The excitation of a stream of regressors, direction by direction.
 
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OMatrix, OVector, U1};
@@ -161,7 +161,7 @@ where
         far
     }
 
-    /// Goes on until none turns far.
+    /// Turns pairs until none turns far.
     #[cold]
     #[inline(never)]
     fn straighten(&mut self) {

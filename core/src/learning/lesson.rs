@@ -1,4 +1,4 @@
-//! What a sample taught, or why nothing.
+//! What an estimator learned from a sample, or why it learned nothing.
 
 use core::fmt;
 

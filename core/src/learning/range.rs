@@ -1,4 +1,4 @@
-//! Where an estimate may go.
+//! The admissible range of an estimate.
 
 use crate::{Parameter, Real};
 
@@ -83,7 +83,7 @@ mod tests {
         assert_eq!((range.low, range.high), (f64::NEG_INFINITY, 0.0f64));
         let gain = Parameter::new("k", "k", "1", "a gain").nonzero();
         assert_eq!(Range::<f64>::of(&gain, 1.0, 4.0, 0.25).low, 1.0);
-        // Which way it acts is not known at zero: then it may be either.
+        // At zero its sign is not known: it may have either.
         let range = Range::<f32>::of(&gain, 3.0, 0.0, 0.25);
         assert_eq!(
             (range.low, range.high, range.scale),

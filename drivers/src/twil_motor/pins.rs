@@ -1,4 +1,4 @@
-//! Pins that are not there, or that are the other way round.
+//! Pins that are missing, or inverted.
 
 use core::convert::Infallible;
 

@@ -1,4 +1,4 @@
-//! What happens when no commands come.
+//! The watchdog: it stops the motors when no commands come.
 
 /// How far a watchdog has gone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! How much a sample makes forget.
+//! The forgetting factor of a sample.
 
 use loopsight_core::Real;
 

@@ -1,4 +1,4 @@
-//! How far from rest effects with a sign have grown up.
+//! The change from rest at which effects with a sign have their full size.
 
 use super::Affine;
 
@@ -11,16 +11,15 @@ const TRIED: usize = 78;
 const GROWN: f64 = 0.3;
 
 impl Affine {
-    /// For each controlled state the change from rest over which what efforts depend on its sign has
-    /// grown up; 0 where nothing does.
+    /// For each controlled state the change from rest at which efforts that depend on its sign have their full size; 0
+    /// where none does.
     ///
     /// ```text
     /// c(s) = (f(s) - f(-s))/2s, of the efforts alone      band = least s with c(s) - c_min < 0.3 (c(0) - c_min)
     /// ```
     ///
-    /// What grows straight (viscous friction) has the same chord everywhere, what grows faster
-    /// (drag) a steeper one: both have no sign. Levels that are 0 or not known yet are tried at their
-    /// scale: they may be learned.
+    /// The chord of a linear effect (viscous friction) has the same slope everywhere, and that of drag grows steeper:
+    /// both have no sign. Levels that are 0 or not known yet are tried at their scale, because they may be learned.
     pub(super) fn find_bands(&mut self) -> Vec<f64> {
         let n = self.bands.len();
         if self.bounds.efforts.is_empty() {

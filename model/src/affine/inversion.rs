@@ -1,13 +1,13 @@
-//! What lies between command and plant, inverted by solving.
+//! The inverse of what lies between command and plant, found by solving equations.
 
-/// Most a command may move per unit that the input wanted moves: within a dead zone the exact
-/// inverse jumps, and noise of the size of nothing would toggle the command across the zone.
+/// Largest change of a command per change of the wanted input. Across a dead zone the exact inverse jumps, and the
+/// least noise would toggle the command between its two sides.
 const STEEPEST: f64 = 50.0;
 /// Relative change at which a solution stands.
 const CLOSE: f64 = 1e-10;
 /// Turns over all commands, where they act on each other (a supply that all of them load).
 const TURNS: usize = 30;
-/// Doublings of a bracket after which a command is taken to do nothing.
+/// Doublings of a bracket after which a command counts as having no effect.
 const DOUBLINGS: usize = 40;
 
 /// Finds commands `V` with `E(V) = u`, where `E` is known by evaluating it.

@@ -1,4 +1,4 @@
-//! How late a plant answers, found from step responses.
+//! The delay of a plant, found from step responses.
 
 use crate::model::{MeasuredSignal, Model};
 use crate::sensor::Sensor;

@@ -1,4 +1,4 @@
-//! The state that the next command will meet.
+//! Prediction of the state at the time when the next command acts.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,8 +8,8 @@ use loopsight_core::{Observation, Place, Tick};
 use super::Affine;
 use super::lateness::{exact, lateness};
 
-/// Share of one over the lateness at which the predictor's models are corrected: their errors then
-/// fade without swinging although they are seen late.
+/// Correction rate of the predictor's models, as a share of one over the lateness: their errors then fade without
+/// oscillation, although they are measured late.
 const CALM: f64 = 0.2;
 
 /// A predictor after Smith, with an observer of what disturbs the plant.
@@ -31,11 +31,10 @@ const CALM: f64 = 0.2;
 /// | `d` | disturbance that explains what the model does not, at the controlled states | of `y` per s |
 /// | `θ` | lateness of the whole, `∫ (C x₀ - ŷ) dt / C x₀(end)` of a step response | s |
 ///
-/// With a right model the controller acts on a plant without delay, and what it was designed for
-/// comes true, later by the delay. Where the model is wrong, `e` is the difference, as in Smith's
-/// scheme: at rest `C x₀ = ŷ`, so that the controller gets what was measured and no error is left.
-/// On a plant that integrates that would not hold, since `x₀` is ahead by what the disturbance does
-/// within the delay; with `d` in both models, and `Φ Δd` in the one ahead, it does.
+/// With an exact model the controller acts on a plant without delay, and the response is the designed one, later by
+/// the delay. Where the model is wrong, `e` is the difference, as in Smith's scheme: at rest `C x₀ = ŷ`, so that the
+/// controller gets the measurement and no error is left. On a plant that integrates, `x₀` would be ahead by what the
+/// disturbance does within the delay. `d` in both models, and `Φ Δd` in the one ahead, correct that.
 ///
 /// Assumptions: the sensors of the controlled states and the delays of the inputs are alike within
 /// each group, so that one lateness stands for them; disturbances that change slowly against `θ`.
@@ -85,7 +84,7 @@ impl Affine {
         self.predictor.as_ref().map(|p| p.lateness)
     }
 
-    /// What the predictor does, in a plain statement.
+    /// What the predictor does, in words.
     pub fn predictor_note(&self) -> Option<String> {
         let late = self.lateness()?;
         let commands = self.predictor.as_ref()?.of_commands;
@@ -167,9 +166,9 @@ impl Predictor {
         }
     }
 
-    /// Takes what was measured; what is not fresh corrects nothing.
+    /// Takes a measurement; one that is not fresh corrects nothing.
     ///
-    /// Allocates where it begins anew: at the first tick, or after its models left the finite numbers.
+    /// Allocates only where it starts over: at the first tick, or after its models diverged.
     pub(super) fn correct(
         &mut self,
         seen: &Observation<'_, f64>,
@@ -224,7 +223,7 @@ impl Predictor {
         self.start = Some(tick);
     }
 
-    /// The controlled states that the next command meets.
+    /// The controlled states at the time when the next command acts.
     pub(super) fn predict(&self, controlled: &'static [usize], to: &mut [f64]) {
         for (to, i) in to.iter_mut().zip(controlled) {
             *to = self.prompt.state()[*i] + self.rest[*i];

@@ -1,17 +1,17 @@
-//! What a controller can do about each effect of a model, found by trying the effect.
+//! What a controller can do about each effect of a model, found by evaluating the effect.
 
 use crate::model::{Model, signals};
 use crate::simulate::bound::{Bound, Bounds, Scene};
 use loopsight_core::{NoPast, Place, PlaceKind};
 
-/// What becomes of an effect in a loop.
+/// How a loop treats an effect.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Treatment {
-    /// Its force is taken into the drift, or what it does to a command is inverted.
+    /// Its force is part of the drift, or its action on a command is inverted.
     Compensated(String),
-    /// It makes commands or measurements late, or falsifies measurements: the state is predicted.
+    /// It delays commands or measurements, or distorts measurements: the state is predicted.
     Predicted(String),
-    /// It is simulated by the predictor but not compensated: which, and why.
+    /// The predictor simulates it, but nothing compensates it: which, and why.
     Simulated(String, String),
     /// It is left out: which, and why.
     Unknown(String, String),
@@ -59,7 +59,7 @@ pub(super) fn lively(model: &Model) -> Vec<f64> {
     model.parameters.iter().enumerate().map(value).collect()
 }
 
-/// What becomes of each effect of `model`.
+/// How each effect of `model` is treated.
 pub(super) fn treatments(model: &Model) -> Vec<Treatment> {
     let trial = Trial::new(model);
     (0..model.effects.len()).map(|i| trial.treat(i)).collect()

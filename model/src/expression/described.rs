@@ -1,4 +1,4 @@
-//! What `list` and `explain` say of effects and plants that a model file defines.
+//! What `list` and `explain` show of effects and plants that a model file defines.
 
 use crate::registry::{PartMeta, Setting};
 

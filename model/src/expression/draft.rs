@@ -1,4 +1,4 @@
-//! An effect as an expression, written down.
+//! An effect as an expression, written as TOML.
 
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value};
 

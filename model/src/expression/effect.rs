@@ -77,7 +77,7 @@ macro_rules! physics {
 physics!(f32, f64, Dual);
 
 impl EffectTable {
-    /// What this table comes to at some channels; made once for the same text.
+    /// The effect of this table at some channels; made once for the same text.
     fn law(
         &self,
         plant: &'static PlantMeta,

@@ -1,7 +1,7 @@
-//! What lives as long as the program.
+//! Declarations that live as long as the program.
 //!
-//! Declarations are `&'static`, since nearly all of them are constants. Those of a model file are
-//! kept for ever, but once: the same text read again is the same declaration.
+//! Declarations are `&'static`, since nearly all of them are constants. Those of a model file are never freed. The
+//! same text read again is the same declaration, so there is only one of each.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;

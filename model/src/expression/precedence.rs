@@ -8,7 +8,7 @@
 use super::operation::{Binary, Function, Unary};
 use super::tree::Tree;
 
-/// What waits for its last operand.
+/// An operator that waits for its last operand.
 #[derive(Clone, Copy)]
 enum Waiting {
     /// A minus in front of its operand.

@@ -1,4 +1,4 @@
-//! An expression as it was understood.
+//! The syntax tree of an expression.
 
 use std::collections::BTreeSet;
 

@@ -16,7 +16,7 @@ use loopsight_core::learning::{Guards, Range};
 #[serde(default, deny_unknown_fields)]
 pub struct LearningSettings {
     /// The controller uses the estimates as if they were true. Otherwise it keeps the model of the
-    /// model file, and the estimates are only watched. Default: false.
+    /// model file, and the estimates are only logged. Default: false.
     pub certainty_equivalence: bool,
     /// Learns also while an actuator saturates. Default: false.
     pub while_saturated: bool,
@@ -42,7 +42,7 @@ pub struct LearningSettings {
     pub range: BTreeMap<String, [f64; 2]>,
 }
 
-/// Size of an excitation that is told from noise, in sizes of the signal per second.
+/// Least excitation that stands out from noise, in sizes of the signal per second.
 const LEAST_EXCITATION: f64 = 0.05;
 
 impl Default for LearningSettings {

@@ -1,11 +1,11 @@
-//! What a loop has although its file does not ask for it: somebody who watches, and limits.
+//! The supervisor and the limits that a loop has although its file does not ask for them.
 
 use super::LoopFile;
 use crate::config::{ConfigError, TomlSource};
 use crate::model::Model;
 use crate::supervisor::{Supervision, SupervisorSettings};
 
-/// Who watches over a loop.
+/// The supervisor of a loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Watch {
     /// How.
@@ -58,7 +58,7 @@ impl LoopFile {
         }
     }
 
-    /// A robot is driven only by a loop in which something says how large its inputs may get.
+    /// A loop drives a robot only if something limits its inputs.
     pub(super) fn limited(
         &self,
         source: &TomlSource,

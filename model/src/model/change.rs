@@ -1,4 +1,4 @@
-//! A composed model with effects added, replaced and taken away.
+//! A composed model with effects added, replaced or removed.
 
 use loopsight_core::Channel;
 

@@ -39,14 +39,14 @@ pub struct SimulationOptions {
     pub max_step_s: Option<f64>,
 }
 
-/// `[fit]`: parameters that a fit estimates or holds, where this differs from their declaration.
+/// `[fit]`: parameters that a fit estimates or freezes, where this differs from their declaration.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitOptions {
     /// Estimated though declared as known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub free: Vec<String>,
-    /// Held though declared as estimated.
+    /// Frozen though declared as estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<String>,
     /// What the plant says they are where no recording shows them ([`Unshown`](loopsight_core::Unshown)).

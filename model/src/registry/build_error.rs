@@ -1,4 +1,4 @@
-//! Why a part cannot be built.
+//! The error of a part that cannot be built.
 
 /// A part that cannot be built from what its table says.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -27,7 +27,7 @@ pub trait ControllerPart: Debug + Send + Sync + Any {
     fn meta(&self) -> &'static PartMeta;
     /// Builds it for a model and a period (s).
     fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError>;
-    /// Plain statements about what was asked for and what the design will give, for reports.
+    /// Sentences for reports: what was asked for and what the design will give.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
@@ -106,8 +106,8 @@ pub trait DriverPart: Debug + Send + Sync + Any {
     fn build(&self, context: &DriverContext<'_>) -> Result<HostDriver, BuildError>;
     /// True when the driver's time is simulated: the loop then runs as fast as it can.
     fn is_simulated(&self) -> bool;
-    /// True where what is measured follows from what is commanded. A log that is played back does not, so nobody
-    /// can tell from it whether a loop goes the wrong way.
+    /// True where the measurements depend on the commands. Those of a log that is played back do not, so they cannot
+    /// show whether a loop goes the wrong way.
     fn is_driven(&self) -> bool {
         true
     }

@@ -1,4 +1,4 @@
-//! A model in motion over a recorded run.
+//! Simulation of a model over a recorded run.
 
 use std::convert::Infallible;
 
@@ -7,7 +7,7 @@ use crate::run::Run;
 
 use super::Simulator;
 
-/// The model simulated over a run from the inputs alone, from the plant state `x0`; held to the
+/// The model simulated over a run from the inputs alone, from the plant state `x0`; corrected by the
 /// measurements where the run has an [observer](Run::observer).
 ///
 /// `each` gets the index of the sample and what the sensors would have read. The first sample is

@@ -12,7 +12,7 @@ const SHORT: f64 = 1e-6;
 /// How a signal runs between two instants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Between {
-    /// Constant: an input that is held.
+    /// Constant: an input between samples.
     Held,
     /// Smooth: the integral is the cubic through its values and rates at both ends.
     Smooth,
@@ -59,7 +59,7 @@ impl<S: HostReal> History<S> {
         }]
     }
 
-    /// From `time` on the signal has `value`, and is held.
+    /// From `time` on the signal has the constant `value`.
     pub(crate) fn hold(&mut self, time: f64, value: S) {
         let n = self.entries.len();
         let integral = if n == 0 {
@@ -93,7 +93,7 @@ impl<S: HostReal> History<S> {
         }
     }
 
-    /// The value at `time`; one that is held has jumped by the time of its entry.
+    /// The value at `time`. A constant one has its new value from the time of its entry on.
     fn instant(&self, time: S) -> S {
         if self.between == Between::Held
             && let Some(entry) = self.entries.iter().find(|e| e.time == time.value())

@@ -59,10 +59,10 @@ impl<S: HostReal> Simulator<'_, S> {
     /// Integrates over `span` with as few steps as the motion allows and no more than `most`: as few that
     /// twice as many come to the same place.
     ///
-    /// A log with a sample every 5 s of an oven whose fastest time constant is 50 s needs two steps per
-    /// sample, and not the two thousand of a robot. Halving is the error estimate of L. F. Richardson
-    /// (E. Hairer, S. P. Nørsett, G. Wanner, 1993, "Solving Ordinary Differential Equations I", section
-    /// II.4). It looks at values alone, so that a simulation and its derivatives take the same steps.
+    /// An oven with a fastest time constant of 50 s, sampled every 5 s, needs two steps per sample; a robot's step
+    /// would make two thousand. Halving is the error estimate of L. F. Richardson (E. Hairer, S. P. Nørsett, G.
+    /// Wanner, 1993, "Solving Ordinary Differential Equations I", section II.4). It uses values alone, so that a
+    /// simulation and its derivatives take the same steps.
     pub(crate) fn advance_lengthened(&mut self, input: &[f64], span: f64, most: usize) {
         let Some(mut kept) = self.lengthened.take() else {
             return self.integrate(input, span, most, true);

@@ -1,4 +1,4 @@
-//! A composed model in motion: the free run that everything is judged by.
+//! Simulation of a composed model: the free run.
 
 pub(crate) mod bound;
 mod follow;
