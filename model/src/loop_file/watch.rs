@@ -22,9 +22,9 @@ const OF_ANY: &str = "the file has no [supervisor]: one is assumed that stops th
                       more, and where a signal goes the wrong way; `supervisor = false` in the file has none";
 
 impl LoopFile {
-    /// Who watches over the loop. Where the file says nothing, somebody does: a loop that uses what it learns
-    /// has a supervisor with the defaults, any other is stopped where no number comes any more or a signal goes the
-    /// wrong way. A log that is played back cannot go wrong.
+    /// The supervisor of the loop, also where the file has none. Then a loop that uses what it learns has a supervisor
+    /// with the defaults; any other is stopped where nothing is measured any more or a signal goes the wrong way. A
+    /// log that is played back needs none.
     pub fn watch(&self) -> Option<Watch> {
         let taught = self
             .learning

@@ -1,4 +1,4 @@
-//! Who watches over a loop whose file says so, says that nobody does, or says nothing.
+//! The key `supervisor` of a loop file: a table, `false`, or absent.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ use super::SupervisorSettings;
 /// `[supervisor]` of a loop file, or `supervisor = false`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Supervision {
-    /// `supervisor = false`: nobody watches.
+    /// `supervisor = false`: no supervisor.
     Nobody,
     /// By these settings.
     By(SupervisorSettings),
