@@ -97,6 +97,7 @@ mod inspect;
 mod list;
 mod log;
 mod model;
+mod pace;
 pub mod parts;
 mod run;
 #[cfg(feature = "cli")]
@@ -107,6 +108,7 @@ pub mod schema;
 mod send;
 mod session;
 mod simulate;
+mod stamps;
 mod watch;
 mod words;
 

@@ -218,6 +218,15 @@ impl Log {
         Ok(log)
     }
 
+    /// Whether its time stamps are a column, of which only the name says the unit.
+    pub(crate) fn has_columns_of_time(&self) -> bool {
+        match &self.source {
+            Source::Table(_) => true,
+            Source::Channels(log) => log.clocks.is_empty(),
+            Source::SysId(_) => false,
+        }
+    }
+
     /// Writes the log as CSV, whole or not at all. Several runs are told apart by a column `run` with their
     /// numbers.
     ///

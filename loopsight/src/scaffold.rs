@@ -1,7 +1,6 @@
 //! A starting point that runs at once: a folder for a robot, or a crate.
 
 mod model_text;
-mod pace;
 mod robot;
 mod texts;
 mod workshop;

@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::inspect::suggest;
 use crate::log::Log;
 use crate::model::Model;
+use crate::stamps;
 
 /// A model and the logs of one machine, and what can be done with them: [`compare`](Self::compare),
 /// [`fit`](Self::fit), [`diagnose`](Self::diagnose), [`improve`](Self::improve), [`add`](Self::add),
@@ -259,6 +260,7 @@ fn matched(model: &mut Composed, log: &Log) -> Result<(Vec<Run>, Vec<Fault>)> {
             None => message,
         })
     })?;
+    stamps::check(model, log, &recording)?;
     bounded::log(&log.name, model, &recording.runs)?;
     Ok((recording.runs, recording.faults))
 }

@@ -33,6 +33,8 @@ pub struct Recording {
     pub runs: Vec<Run>,
     /// What the columns of [`Run::measured`] are.
     pub measured: Vec<MappedSignal>,
+    /// The column of the time stamps, as its header stands in the file.
+    pub time: String,
     /// What is wrong with the log, the worst first.
     pub faults: Vec<Fault>,
 }
@@ -82,6 +84,7 @@ pub fn map(
         source: table.source.clone(),
         runs,
         measured: plan.measured.iter().map(|(_, m)| m.clone()).collect(),
+        time: (table.columns.get(plan.time.column)).map_or_else(String::new, |c| c.text.clone()),
         faults: Vec::new(),
     };
     if let Source::SysId(log) = source {

@@ -5,8 +5,8 @@ use loopsight_model::config::PathSegment;
 use loopsight_model::model::{Model, misfit};
 use loopsight_model::registry::{self, range_text};
 
-use super::pace::Pace;
 use super::texts::{program, quoted};
+use crate::pace::Pace;
 
 /// A text in lines that begin with `# `.
 fn comment(text: &str) -> String {

@@ -11,10 +11,10 @@ use loopsight_recordings::output::NewFolder;
 
 use super::Made;
 use super::model_text::model_text;
-use super::pace::{Pace, rounded_down};
 use super::texts::{DRIVE, commands, experiment_text, loop_text, readme_text};
 use crate::error::{Error, Result};
 use crate::files::Reads;
+use crate::pace::{Pace, rounded_down};
 use crate::run::Loop;
 use crate::simulate::Experiment;
 

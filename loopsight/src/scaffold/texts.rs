@@ -2,7 +2,7 @@
 
 use loopsight_core::PlantMeta;
 
-use super::pace::{Pace, rounded_down};
+use crate::pace::{Pace, rounded_down};
 
 /// Of an input that is driven, in sizes of its signal: 9 V at a motor.
 pub(super) const DRIVE: f64 = 9.0;

@@ -1,4 +1,4 @@
-//! How fast a plant moves, for an experiment that suits it.
+//! How fast a plant moves: for an experiment that suits it, and for time stamps that do not.
 
 use loopsight_core::Real;
 use loopsight_model::model::Model;
@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, Schur};
 /// The time constants `1/|λ|` of a plant, s: `λ` are the eigenvalues of its equations, linearised
 /// at a state to which its inputs drive it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Pace {
-    pub(super) fastest: f64,
-    pub(super) slowest: f64,
+pub(crate) struct Pace {
+    pub(crate) fastest: f64,
+    pub(crate) slowest: f64,
 }
 
 /// Beyond this ratio to the fastest a motion counts as an integral: it has no time constant.
@@ -25,50 +25,66 @@ impl Pace {
     ///
     /// The state is the one that is reached from 0 in one time constant, because a plant may be singular at 0 (an
     /// empty tank). A few rounds find state and time constant together.
-    pub(super) fn of(model: &Model, drive: &[f64]) -> Self {
-        let mut pace = Self {
+    #[cfg(feature = "cli")]
+    pub(crate) fn of(model: &Model, drive: &[f64]) -> Self {
+        Self::known(model, drive).unwrap_or(Self {
             fastest: 1.0,
             slowest: 1.0,
-        };
+        })
+    }
+
+    /// As [`Pace::of`]; none where nothing has a time constant.
+    pub(crate) fn known(model: &Model, drive: &[f64]) -> Option<Self> {
+        let mut found = None;
         for _ in 0..4 {
+            let pace = found.unwrap_or(Self {
+                fastest: 1.0,
+                slowest: 1.0,
+            });
             let state = reached(model, drive, pace);
             match time_constants(model, &state, drive) {
-                Some(found) => pace = found,
+                Some(pace) => found = Some(pace),
                 None => break,
             }
         }
-        pace
+        found
     }
 
     /// Sampling period: five samples in the fastest time constant, s.
-    pub(super) fn period(&self) -> f64 {
+    #[cfg(feature = "cli")]
+    pub(crate) fn period(&self) -> f64 {
         let most = 20_000.0;
         rounded_down(0.2 * self.fastest).max(rounded_down(2.0 * self.duration() / most))
     }
 
     /// How long an input stays constant: about until the slowest motion has settled, s.
-    pub(super) fn hold(&self) -> f64 {
+    #[cfg(feature = "cli")]
+    pub(crate) fn hold(&self) -> f64 {
         rounded_down(5.5 * self.slowest)
     }
 
     /// Length of an experiment: fifty draws of the inputs, s.
-    pub(super) fn duration(&self) -> f64 {
+    #[cfg(feature = "cli")]
+    pub(crate) fn duration(&self) -> f64 {
         50.0 * self.hold()
     }
 
     /// Longest integration step of a model, s.
-    pub(super) fn model_step(&self) -> f64 {
+    #[cfg(feature = "cli")]
+    pub(crate) fn model_step(&self) -> f64 {
         (0.25 * self.period()).min(0.25 * self.fastest)
     }
 
     /// Longest integration step of a robot, much finer than the model's, s.
-    pub(super) fn robot_step(&self) -> f64 {
+    #[cfg(feature = "cli")]
+    pub(crate) fn robot_step(&self) -> f64 {
         0.04 * self.model_step()
     }
 }
 
 /// The largest of 1, 2, 5 times a power of ten that is not above `value`.
-pub(super) fn rounded_down(value: f64) -> f64 {
+#[cfg(feature = "cli")]
+pub(crate) fn rounded_down(value: f64) -> f64 {
     let power = value.log10().floor();
     let digit = value / 10f64.powf(power);
     let nice = [5.0, 2.0].into_iter().find(|n| digit >= n * (1.0 - 1e-9));
