@@ -1,18 +1,28 @@
 //! What is in a log of another program, and a model file for it.
 
 mod likely;
+#[cfg(feature = "cli")]
+pub(crate) mod questions;
 pub(crate) mod suggest;
 mod toml;
 
+use std::path::Path;
+
 use loopsight_core::PlantMeta;
+use loopsight_core::unit::parse;
+use loopsight_model::model::Model as Composed;
 use loopsight_model::registry;
-use loopsight_recordings::{ChannelFacts, Inventory, Kind};
+use loopsight_recordings::{ChannelFacts, Inventory, Kind, survey};
 
 use crate::answers::{Answer, FittingPlant, InspectAnswer, InspectedChannel};
 use crate::error::{Error, Result};
 use crate::log::Log;
 use crate::model::Model;
+use crate::stamps::{self, Doubt};
 use crate::words;
+
+/// A larger file is not kept in memory to say what is in it, bytes.
+const LARGE: u64 = 64 << 20;
 
 /// What is known of a log beforehand.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +34,8 @@ pub struct InspectOptions {
     pub inputs: Vec<String>,
     /// Channels of the measured signals: `speed=drive/omega`, or the channel of the first state alone.
     pub measured: Vec<String>,
+    /// Units of channels that the log does not say, the time's as well: `u=V`, `t=ms`.
+    pub units: Vec<String>,
     /// Time from one row to the next, s, of a log without time stamps.
     pub period_s: Option<f64>,
 }
@@ -47,6 +59,13 @@ impl InspectOptions {
     #[must_use]
     pub fn measure(mut self, channel: impl Into<String>) -> Self {
         self.measured.push(channel.into());
+        self
+    }
+
+    /// The unit of a channel: `CHANNEL=UNIT`.
+    #[must_use]
+    pub fn unit(mut self, unit: impl Into<String>) -> Self {
+        self.units.push(unit.into());
         self
     }
 
@@ -76,56 +95,106 @@ impl InspectOptions {
 ///
 /// A plant, an input or a channel that was named is not there.
 pub fn inspect(log: &Log, options: &InspectOptions) -> Result<InspectAnswer> {
-    let inventory = log.source.inventory();
-    let known = Known::new(&inventory, options)?;
+    examined(log.name(), &log.source.inventory(), Some(log), options)
+}
+
+/// As [`inspect`], of a file. One above 64 MB with channels (MCAP, ULog, HDF5 and the like) is counted on the
+/// way and not kept: memory does not grow with its length.
+///
+/// # Errors
+///
+/// As [`Log::read`] and [`inspect`].
+pub fn inspect_file(path: impl AsRef<Path>, options: &InspectOptions) -> Result<InspectAnswer> {
+    let path = path.as_ref();
+    let large = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() > LARGE);
+    if large {
+        let name = path.display().to_string();
+        let counted = survey(path).map_err(|error| Error::in_log(&error, &name, None))?;
+        if let Some(inventory) = counted {
+            return examined(&name, &inventory, None, options);
+        }
+    }
+    inspect(&Log::read(path)?, options)
+}
+
+fn examined(
+    name: &str,
+    inventory: &Inventory,
+    log: Option<&Log>,
+    options: &InspectOptions,
+) -> Result<InspectAnswer> {
+    let known = Known::new(inventory, options)?;
     let mut plants: Vec<(f64, usize, FittingPlant)> = Vec::new();
     for meta in registry::plants() {
         if options.plant.as_deref().is_some_and(|id| id != meta.id) {
             continue;
         }
-        if let Some((score, plant)) = likely::fitting(meta, &inventory, &known)? {
+        if let Some((score, plant)) = likely::fitting(meta, inventory, &known)? {
             plants.push((score, meta.parameters.len(), plant));
         } else if options.plant.is_some() {
-            return Err(unfit(log, meta));
+            return Err(unfit(name, meta));
         }
     }
     // Of plants that fit alike, the simplest is tried first.
     plants.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let plants: Vec<FittingPlant> = plants.into_iter().map(|(_, _, plant)| plant).collect();
-    let state = state(&inventory).map(|c| c.path.clone());
-    let model_toml = match log.source.model_toml() {
+    let state = state(inventory).map(|c| c.path.clone());
+    let mut notes = inventory.notes.clone();
+    let described = log.and_then(|log| log.source.model_toml());
+    let model_toml = match described {
         Some(text) if options.plant.is_none() => Some(text),
         _ => plants.first().map(|plant| {
-            let stamps = inventory
-                .channels
-                .iter()
-                .any(|c| c.clock.is_some() || c.is_time);
-            let period = toml::Period::new(stamps, options.period_s);
-            toml::model(
-                log.name(),
-                plant,
-                &inventory,
-                state.as_deref(),
-                period,
-                !known.measured.is_empty(),
-            )
+            let stamps = |c: &ChannelFacts| c.clock.is_some() || c.is_time;
+            let stamped = inventory.channels.iter().any(stamps);
+            let text = |unit: Option<(&str, &str)>| {
+                let period = toml::Period::new(stamped, options.period_s, unit);
+                let (state, named) = (state.as_deref(), !known.measured.is_empty());
+                toml::model(name, plant, inventory, state, period, named)
+            };
+            let time = inventory.channels.iter().find(|c| c.is_time);
+            if let Some(unit) = time.and_then(|c| known.unit(&c.path)) {
+                return text(Some((unit, "")));
+            }
+            let first = text(None);
+            match log.and_then(|log| doubted(log, &first)) {
+                Some(doubt) => {
+                    let reason = doubt.reason();
+                    notes.push(format!(
+                        "the time stamps seem to be {}, not s: {reason}",
+                        doubt.unit
+                    ));
+                    text(Some((
+                        doubt.unit,
+                        &format!("a guess: taken as s, {reason}"),
+                    )))
+                }
+                None => first,
+            }
         }),
     };
     let mut answer = InspectAnswer {
         schema: InspectAnswer::SCHEMA,
         summary: String::new(),
-        file: log.name().to_owned(),
+        file: name.to_owned(),
         format: inventory.format.clone(),
         duration_s: inventory.duration,
         runs: inventory.runs,
         state,
-        notes: inventory.notes.clone(),
+        notes,
         channels: inventory.channels.iter().map(inspected).collect(),
         plants,
         model_toml,
+        inventory: inventory.clone(),
     };
     answer.summary = summary(&answer);
     Ok(answer)
+}
+
+/// Whether the time stamps of a log are seconds for the model that was made for it.
+fn doubted(log: &Log, model_toml: &str) -> Option<Doubt> {
+    let (model, _) = Composed::from_toml("model.toml", model_toml).ok()?;
+    let recording = crate::session::map(&model, &log.source).ok()?;
+    stamps::doubt(&model, &recording.runs).filter(|_| log.has_columns_of_time())
 }
 
 /// What the caller said of the log.
@@ -133,9 +202,17 @@ pub fn inspect(log: &Log, options: &InspectOptions) -> Result<InspectAnswer> {
 struct Known {
     inputs: Vec<(Option<String>, String)>,
     measured: Vec<(Option<String>, String)>,
+    /// Channels and their units.
+    units: Vec<(String, String)>,
 }
 
 impl Known {
+    /// What the caller said of a channel.
+    fn unit(&self, path: &str) -> Option<&str> {
+        let found = self.units.iter().find(|(channel, _)| channel == path);
+        found.map(|(_, unit)| unit.as_str())
+    }
+
     fn new(inventory: &Inventory, options: &InspectOptions) -> Result<Self> {
         if let Some(id) = &options.plant {
             Model::of_plant(id)?;
@@ -162,15 +239,25 @@ impl Known {
                 }
             }
         };
+        let unit = |given: &String| -> Result<(String, String)> {
+            let Some((name, unit)) = given.rsplit_once('=') else {
+                return Err(Error::request(format!(
+                    "expected CHANNEL=UNIT, found `{given}`"
+                )));
+            };
+            parse(unit).map_err(|error| Error::request(format!("`{given}`: {error}")))?;
+            Ok((split(&name.to_owned())?.1, unit.to_owned()))
+        };
         let all = |given: &[String]| given.iter().map(split).collect::<Result<Vec<_>>>();
         Ok(Self {
             inputs: all(&options.inputs)?,
             measured: all(&options.measured)?,
+            units: options.units.iter().map(unit).collect::<Result<Vec<_>>>()?,
         })
     }
 }
 
-fn unfit(log: &Log, meta: &PlantMeta) -> Error {
+fn unfit(log: &str, meta: &PlantMeta) -> Error {
     let ids = |signals: &[loopsight_core::Signal]| {
         let ids: Vec<&str> = signals
             .iter()
@@ -182,7 +269,7 @@ fn unfit(log: &Log, meta: &PlantMeta) -> Error {
     Error::request(format!(
         "{}: no channel seems to be an input or a signal of `{}`; it needs the inputs {} and one of {}; \
          say them with --input ID=CHANNEL and --measure ID=CHANNEL",
-        log.name(),
+        log,
         meta.id,
         ids(meta.inputs),
         ids(meta.states),

@@ -127,7 +127,7 @@ pub use experiment::{Ask, ExperimentOptions};
 pub use explain::explain;
 pub use fit::{FitOptions, Method, Scheme};
 pub use improve::ImproveOptions;
-pub use inspect::{InspectOptions, inspect};
+pub use inspect::{InspectOptions, inspect, inspect_file};
 pub use list::{ListOptions, PartRole, list};
 pub use log::{Log, LogBuilder};
 pub use loopsight_recordings::output::Written;

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use loopsight_core::Signal;
 use loopsight_core::unit::{parse, split_name};
-use loopsight_formats::{Channel, Log, Values};
+use loopsight_formats::{Channel, Cut, Log, Values};
 use loopsight_model::log_map::{Column, ColumnMap, LogMap};
 
 use crate::derive;
@@ -122,6 +122,11 @@ pub(crate) fn table(log: &Log) -> Table {
 
 /// Topic of the rows of a log that a loop wrote.
 const OWN: &str = "loop/";
+
+/// Whether a channel is one of a loop's own log.
+pub(crate) fn is_own(path: &str) -> bool {
+    path.strip_prefix(OWN) == Some(TIME)
+}
 
 /// The table of a log that a loop wrote as MCAP: its columns are the fields of one topic.
 pub(crate) fn own(log: &Log) -> Option<Table> {
@@ -287,18 +292,17 @@ fn rows(log: &Log, columns: &[usize], n: usize) -> Table {
         }],
         labels: labels(&channels),
         own_clocks: false,
-        cut: cut(log).unwrap_or_default(),
+        cut: log.cut.as_ref().map_or_else(String::new, cut),
         stamps: None,
     }
 }
 
 /// Where the file ends too early; none where it is whole.
-pub(crate) fn cut(log: &Log) -> Option<String> {
-    let cut = log.cut.as_ref()?;
-    Some(format!(
+pub(crate) fn cut(cut: &Cut) -> String {
+    format!(
         "the file ends too early: {} at byte {} is cut",
         cut.what, cut.at
-    ))
+    )
 }
 
 fn labels(channels: &[&Channel]) -> BTreeMap<usize, Vec<String>> {
@@ -415,7 +419,7 @@ fn on_all_stamps(log: &Log, wanted: &Wanted) -> Table {
         }],
         labels: labels.into_iter().map(|(at, w)| (at + 1, w)).collect(),
         own_clocks: true,
-        cut: cut(log).unwrap_or_default(),
+        cut: log.cut.as_ref().map_or_else(String::new, cut),
         stamps: None,
     }
 }

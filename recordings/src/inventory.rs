@@ -1,20 +1,22 @@
 //! What is in a log, whatever wrote it: channels with unit, rate, range and what is missing.
 
-use loopsight_core::unit::{parse, split_name};
-use loopsight_formats::{Kind, Log, Values};
+mod clock;
+mod count;
+mod picture;
+mod survey;
 
-use crate::channels::{cut, last};
-use crate::median::median;
-use crate::naming::{self, brackets};
+use loopsight_core::unit::{parse, split_name};
+use loopsight_formats::Kind;
+
+use crate::channels::last;
+use crate::naming::{self, brackets, is_time};
 use crate::source::Source;
 use crate::table::Table;
+use clock::ClockCount;
+use count::{ValueCount, short};
 
-/// A pause is longer than so many periods.
-const GAP: f64 = 5.0;
-/// Words of a text that are shown.
-const WORDS: usize = 12;
-/// Beginnings of the names of columns of time stamps.
-const TIME_NAMES: [&str; 3] = ["time", "timestamp", "stamp"];
+pub use picture::Picture;
+pub use survey::survey;
 
 /// What is in a log.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,8 +50,12 @@ pub struct ChannelFacts {
     pub missing: usize,
     /// Smallest and largest number.
     pub range: Option<(f64, f64)>,
-    /// The first texts that occur.
+    /// The first texts that occur, long ones in part.
     pub words: Vec<String>,
+    /// Root mean square change from value to value over the standard deviation: small for what is smooth, √2 for noise.
+    pub roughness: Option<f64>,
+    /// How it runs; empty for texts.
+    pub picture: Picture,
     /// Its time stamps; none without a clock.
     pub clock: Option<ClockFacts>,
     /// It is the column of time stamps itself.
@@ -88,60 +94,8 @@ impl Source {
         match self {
             Source::Table(table) => of_table(table, "CSV"),
             Source::SysId(log) => of_table(&log.table(), "SysId JSON"),
-            Source::Channels(log) => of_channels(log),
+            Source::Channels(log) => survey::of_log(log),
         }
-    }
-}
-
-fn of_channels(log: &Log) -> Inventory {
-    let clocks: Vec<Option<ClockFacts>> = log.clocks.iter().map(|c| clock(&[&c.time])).collect();
-    let channels: Vec<ChannelFacts> = log
-        .channels
-        .iter()
-        .map(|channel| {
-            let info = &channel.info;
-            let (missing, range, words) = match &channel.values {
-                Values::Numbers(values) => {
-                    let (missing, range) = numbers(values.iter().copied());
-                    (missing, range, Vec::new())
-                }
-                Values::Texts(texts) => {
-                    let missing = texts.iter().filter(Option::is_none).count();
-                    let words = texts.words().iter().take(WORDS).cloned().collect();
-                    (missing, None, words)
-                }
-                Values::Opaque(_) => (0, None, Vec::new()),
-            };
-            ChannelFacts {
-                path: info.path.clone(),
-                kind: info.kind,
-                declared: info.declared.clone(),
-                unit: unit(info.unit.as_deref(), &info.path),
-                values: channel.values.len(),
-                missing,
-                range,
-                words,
-                clock: info.clock.and_then(|at| *clocks.get(at)?),
-                is_time: info.clock.is_none() && is_time(last(&info.path)),
-            }
-        })
-        .collect();
-    let spans = || channels.iter().filter_map(|c| Some(c.clock?.span));
-    let first = spans().map(|s| s.0).fold(f64::INFINITY, f64::min);
-    let end = spans().map(|s| s.1).fold(f64::NEG_INFINITY, f64::max);
-    let mut notes = log.notes.clone();
-    notes.extend(cut(log));
-    let mut duration = (end >= first).then_some(end - first);
-    if duration.is_none() {
-        let time = channels.iter().find(|c| c.is_time);
-        duration = time.and_then(|c| Some(c.range?.1 - c.range?.0));
-    }
-    Inventory {
-        format: log.format.to_string(),
-        duration,
-        runs: 1,
-        channels,
-        notes,
     }
 }
 
@@ -153,29 +107,29 @@ fn of_table(table: &Table, format: &str) -> Inventory {
         let unit = table.columns.get(column)?.unit.as_deref()?;
         parse(unit).ok().map(|u| u.factor)
     };
-    let stamps: Vec<Vec<f64>> = time.map_or_else(Vec::new, |column| {
-        let factor = seconds(column).unwrap_or(1.0);
-        let of = |rows: &[f64]| {
-            rows.chunks_exact(width)
-                .map(|r| factor * r[column])
-                .collect()
-        };
-        table.runs.iter().map(|run| of(&run.rows)).collect()
-    });
-    let slices: Vec<&[f64]> = stamps.iter().map(Vec::as_slice).collect();
-    let clock = clock(&slices);
+    let factor = time.and_then(seconds).unwrap_or(1.0);
+    let stamp = |row: &[f64]| time.map(|column| factor * row[column]);
+    let mut count = ClockCount::default();
+    for run in &table.runs {
+        count.restart();
+        let stamps = run.rows.chunks_exact(width).filter_map(stamp);
+        stamps.for_each(|t| count.tick(t));
+    }
+    let clock = count.facts();
     let channels = table.columns.iter().enumerate().map(|(at, column)| {
         let words = table.labels.get(&at);
-        let all = || {
-            table
-                .runs
-                .iter()
-                .flat_map(|run| run.rows.chunks_exact(width))
-        };
-        let (missing, range) = numbers(all().map(|row| row[at]));
+        let kind = words.map_or(Kind::Number, |_| Kind::Text);
+        let mut count = ValueCount::default();
+        let rows = table
+            .runs
+            .iter()
+            .flat_map(|run| run.rows.chunks_exact(width));
+        for (number, row) in rows.enumerate() {
+            count.number(stamp(row).unwrap_or(number as f64), row[at]);
+        }
         ChannelFacts {
             path: column.text.clone(),
-            kind: words.map_or(Kind::Number, |_| Kind::Text),
+            kind,
             declared: String::new(),
             unit: column.unit.clone().map(|unit| UnitFact {
                 unit,
@@ -185,12 +139,19 @@ fn of_table(table: &Table, format: &str) -> Inventory {
                     None => "the end of the name",
                 },
             }),
-            values: all().count(),
-            missing,
-            range: range.filter(|_| words.is_none()),
-            words: words.map_or_else(Vec::new, |w| w.iter().take(WORDS).cloned().collect()),
+            values: count.values,
+            missing: count.missing,
+            range: count.range(kind),
+            roughness: count.roughness().filter(|_| words.is_none()),
+            words: words.map_or_else(Vec::new, |w| {
+                w.iter().take(count::WORDS).map(|w| short(w)).collect()
+            }),
             clock: clock.filter(|_| time != Some(at)),
             is_time: time == Some(at),
+            picture: match words {
+                Some(_) => Picture::default(),
+                None => count.picture,
+            },
         }
     });
     Inventory {
@@ -200,24 +161,6 @@ fn of_table(table: &Table, format: &str) -> Inventory {
         channels: channels.collect(),
         notes: Vec::new(),
     }
-}
-
-fn is_time(name: &str) -> bool {
-    let name = name.to_lowercase();
-    name == "t" || TIME_NAMES.iter().any(|n| name.starts_with(n))
-}
-
-/// How many are missing, and the range of the others.
-fn numbers(values: impl Iterator<Item = f64>) -> (usize, Option<(f64, f64)>) {
-    let (mut missing, mut low, mut high) = (0, f64::INFINITY, f64::NEG_INFINITY);
-    for value in values {
-        if value.is_nan() {
-            missing += 1;
-        } else {
-            (low, high) = (low.min(value), high.max(value));
-        }
-    }
-    (missing, (low <= high).then_some((low, high)))
 }
 
 /// The unit that a file declares, or that the name says.
@@ -246,44 +189,6 @@ fn unit(declared: Option<&str>, path: &str) -> Option<UnitFact> {
     ];
     let found = guesses.iter().find(|(word, _)| words.contains(word));
     found.map(|(_, unit)| fact(unit, "a guess from the name"))
-}
-
-/// How time stamps run; runs follow each other.
-fn clock(runs: &[&[f64]]) -> Option<ClockFacts> {
-    let mut steps: Vec<f64> = Vec::new();
-    let mut backwards = 0;
-    let (mut first, mut end) = (f64::INFINITY, f64::NEG_INFINITY);
-    for run in runs {
-        for stamp in run.iter().filter(|t| t.is_finite()) {
-            (first, end) = (first.min(*stamp), end.max(*stamp));
-        }
-        for pair in run.windows(2) {
-            let step = pair[1] - pair[0];
-            if step < 0.0 {
-                backwards += 1;
-            } else if step.is_finite() {
-                steps.push(step);
-            }
-        }
-    }
-    if end < first {
-        return None;
-    }
-    let period = median(&mut steps.clone());
-    let mut deviations: Vec<f64> = steps.iter().map(|step| (step - period).abs()).collect();
-    let pauses = || {
-        steps
-            .iter()
-            .filter(|step| period > 0.0 && **step > GAP * period)
-    };
-    Some(ClockFacts {
-        span: (first, end),
-        period,
-        jitter: median(&mut deviations),
-        gaps: pauses().count(),
-        longest_gap: pauses().copied().fold(0.0, f64::max),
-        backwards,
-    })
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ pub use csv_read::read_csv_from;
 pub use csv_write::{LogWriter, column, header, write_csv};
 pub use error::{Location, RecordingError};
 pub use fault::{Fault, FaultKind, Severity};
-pub use inventory::{ChannelFacts, ClockFacts, Inventory, UnitFact};
+pub use inventory::{ChannelFacts, ClockFacts, Inventory, Picture, UnitFact, survey};
 pub use loopsight_formats::Kind;
 pub use map::{MappedSignal, Recording, map};
 pub use source::{Source, read, read_bytes};

@@ -22,6 +22,46 @@ const TEMPERATURES: [(&str, (f64, f64)); 12] = [
     ("fahrenheit", FAHRENHEIT),
 ];
 
+/// Beginnings of the names of columns of time stamps.
+const TIME_NAMES: [&str; 4] = ["time", "timestamp", "stamp", "elapsed"];
+/// Words of time that stand at the end of names.
+const TIMES: [(&str, &str); 14] = [
+    ("millis", "ms"),
+    ("millisecond", "ms"),
+    ("milliseconds", "ms"),
+    ("msec", "ms"),
+    ("micros", "us"),
+    ("microsecond", "us"),
+    ("microseconds", "us"),
+    ("usec", "us"),
+    ("nanos", "ns"),
+    ("nanosecond", "ns"),
+    ("nanoseconds", "ns"),
+    ("nsec", "ns"),
+    ("sec", "s"),
+    ("secs", "s"),
+];
+
+/// The name and the unit of a header that ends with a word of time: `time_millis`, `timeMillis`, `millis`.
+fn time(text: &str) -> Option<(&str, &'static str)> {
+    let lower = text.to_ascii_lowercase();
+    let ends = |(word, _): &&(&str, &str)| lower.ends_with(word);
+    let (word, unit) = TIMES
+        .iter()
+        .filter(ends)
+        .max_by_key(|(word, _)| word.len())?;
+    let (name, ending) = text.split_at_checked(text.len() - word.len())?;
+    let apart = name.ends_with(['_', ' ', '-', '.']);
+    let camel = name.ends_with(char::is_lowercase) && ending.starts_with(char::is_uppercase);
+    let name = name.trim_end_matches(['_', ' ', '-', '.']);
+    match name.is_empty() {
+        // `millis` alone is a time; `sec` is an effort somewhere.
+        true if word.len() > 4 => Some((text, unit)),
+        false if apart || camel => Some((name, unit)),
+        _ => None,
+    }
+}
+
 /// Factor and offset to kelvin of a scale of temperatures; `C` and `F` are one where a temperature is expected.
 pub(crate) fn temperature(unit: &str, expected: bool) -> Option<(f64, f64)> {
     match unit {
@@ -46,6 +86,9 @@ pub(crate) fn split(text: &str) -> (&str, Option<String>) {
         return (name, Some(unit));
     }
     if let (name, Some(unit)) = split_name(text) {
+        return (name, Some(unit.to_owned()));
+    }
+    if let Some((name, unit)) = time(text) {
         return (name, Some(unit.to_owned()));
     }
     for (word, _) in TEMPERATURES {
@@ -82,6 +125,13 @@ pub(crate) fn brackets(text: &str) -> Option<(&str, String)> {
     None
 }
 
+/// Whether a name is that of a column of time stamps.
+pub(crate) fn is_time(name: &str) -> bool {
+    let name = plain(name);
+    let alone = || time(&name).is_some_and(|(rest, _)| rest == name);
+    name == "t" || TIME_NAMES.iter().any(|n| name.starts_with(n)) || alone()
+}
+
 /// A name as ids are written: small letters, words joined by `_`.
 pub(crate) fn plain(name: &str) -> String {
     let mut out = String::with_capacity(name.len());
@@ -110,6 +160,12 @@ mod tests {
             ("room [°F]", "room", Some("°F")),
             ("Room Celsius", "Room", Some("celsius")),
             ("weights[1]", "weights[1]", None),
+            ("time_millis", "time", Some("ms")),
+            ("timeMillis", "time", Some("ms")),
+            ("timestamp_usec", "timestamp", Some("us")),
+            ("millis", "millis", Some("ms")),
+            ("elapsed_sec", "elapsed", Some("s")),
+            ("parsec", "parsec", None),
             ("omega", "omega", None),
             ("(V)", "(V)", None),
         ] {

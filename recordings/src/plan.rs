@@ -267,10 +267,7 @@ impl Finder<'_> {
             );
         }
         let columns = &self.table.columns;
-        let is_time = |name: &str| {
-            let name = naming::plain(name);
-            name.starts_with("time") || name == "t"
-        };
+        let is_time = naming::is_time;
         let second = parse("s").ok().map(|s| s.dimension);
         let in_seconds = |unit: &str| parse(unit).ok().map(|u| u.dimension) == second;
         let with_unit = columns

@@ -60,6 +60,7 @@ mod fit;
 mod html;
 mod improvement;
 mod intervals;
+mod inventory;
 mod next;
 mod numbers;
 mod packed;
@@ -85,6 +86,7 @@ pub use diagnosis::diagnosis_page;
 pub use figure::{Figure, FigurePanel, FigureTrace, Style, figure_svg};
 pub use fit::fit_page;
 pub use improvement::improvement_page;
+pub use inventory::inventory_page;
 pub use page::Context;
 pub use record::{
     ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace, Timing,

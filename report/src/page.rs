@@ -23,8 +23,26 @@ pub struct Context {
     pub command: String,
 }
 
-/// A whole page around `body` (HTML).
+/// A whole page around `body` (HTML), with the library that draws its charts.
 pub(crate) fn page(context: &Context, body: &str) -> String {
+    let scripts = format!(
+        "<script type=\"application/gzip\" id=\"library\">{}</script>\n<script>\n{SCRIPT}</script>\n",
+        library()
+    );
+    framed(
+        context,
+        body,
+        "; charts by plotly.js (MIT licence)",
+        &scripts,
+    )
+}
+
+/// A whole page around `body` (HTML) that has no charts.
+pub(crate) fn plain_page(context: &Context, body: &str) -> String {
+    framed(context, body, "", "")
+}
+
+fn framed(context: &Context, body: &str, credits: &str, scripts: &str) -> String {
     let title = escape(&context.title);
     let mut about = vec![format!("<b>{}</b>", escape(&context.model_name))];
     about.extend(
@@ -44,7 +62,13 @@ pub(crate) fn page(context: &Context, body: &str) -> String {
         format!("Made with <code>{}</code>. ", escape(&context.command))
     };
     let version = env!("CARGO_PKG_VERSION");
-    let library = library();
+    let warning = match scripts.is_empty() {
+        true => "",
+        false => {
+            "<p class=\"box\" id=\"trouble\" hidden></p>\n\
+             <noscript><p class=\"box\">The charts on this page need JavaScript.</p></noscript>\n"
+        }
+    };
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
@@ -54,12 +78,9 @@ pub(crate) fn page(context: &Context, body: &str) -> String {
          base-uri 'none'; form-action 'none'\">\n\
          <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n\
          <header><h1>{title}</h1><p class=\"about\">{about}</p></header>\n\
-         <p class=\"box\" id=\"trouble\" hidden></p>\n\
-         <noscript><p class=\"box\">The charts on this page need JavaScript.</p></noscript>\n\
-         {notes}{body}\
-         <footer>{command}loopsight {version}; charts by plotly.js (MIT licence).</footer>\n</main>\n\
-         <script type=\"application/gzip\" id=\"library\">{library}</script>\n\
-         <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
+         {warning}{notes}{body}\
+         <footer>{command}loopsight {version}{credits}.</footer>\n</main>\n\
+         {scripts}</body>\n</html>\n"
     )
 }
 

@@ -1,5 +1,7 @@
 //! What [`inspect`](crate::inspect()) answers.
 
+use loopsight_recordings::Inventory;
+use loopsight_report::Context;
 use serde::Serialize;
 
 use super::Answer;
@@ -32,6 +34,9 @@ pub struct InspectAnswer {
     pub plants: Vec<FittingPlant>,
     /// A model file for the first of them; `null` where no plant fits.
     pub model_toml: Option<String>,
+    #[serde(skip)]
+    #[cfg_attr(feature = "schema", schemars(skip))]
+    pub(crate) inventory: Inventory,
 }
 
 /// A channel of a log.
@@ -102,4 +107,21 @@ pub struct MappedChannel {
 
 impl Answer for InspectAnswer {
     const SCHEMA: &'static str = "loopsight/inspect/1";
+}
+
+impl InspectAnswer {
+    /// A page with a small picture of each channel (HTML) that opens offline; `command` stands at its foot and may be
+    /// empty.
+    pub fn page(&self, command: &str) -> String {
+        let context = Context {
+            title: format!("What is in {}", self.file),
+            model_name: self.format.clone(),
+            log_file: self.file.clone(),
+            notes: self.notes.clone(),
+            command: command.to_owned(),
+            ..Context::default()
+        };
+        let model = self.model_toml.as_deref();
+        loopsight_report::inventory_page(&context, &self.summary, &self.inventory, model)
+    }
 }

@@ -104,9 +104,15 @@ pub(crate) struct InspectArguments {
     /// The channel of a measured signal; without ID that of the first state.
     #[arg(long = "measure", value_name = "[ID=]CHANNEL")]
     pub(crate) measured: Vec<String>,
+    /// The unit of a channel, of the time as well, where the log does not say it: `u=V`, `t=ms`.
+    #[arg(long = "unit", value_name = "CHANNEL=UNIT")]
+    pub(crate) units: Vec<String>,
     /// Time from one row to the next, s, of a log without time stamps.
     #[arg(long, value_name = "SECONDS")]
     pub(crate) period: Option<f64>,
+    /// Write a page with a small picture of each channel (HTML).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) html: Option<PathBuf>,
     /// JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,

@@ -50,6 +50,8 @@ const WISHES: [&str; 6] = [
 const SUPPLIES: [&str; 4] = ["bus", "battery", "supply", "input"];
 /// What reached the motor.
 const APPLIED: [&str; 3] = ["applied", "output", "motor"];
+/// What flows, where a log calls it so.
+const CURRENTS: [&str; 4] = ["i", "current", "amps", "amperes"];
 const SIDES: [&str; 2] = ["right", "left"];
 
 /// A plant whose inputs are all there and of which something was measured, with a score.
@@ -72,7 +74,7 @@ pub(super) fn fitting(
         };
         total += score;
         taken.push(&channel.path);
-        inputs.push(mapped(signal, channel));
+        inputs.push(mapped(signal, channel, known));
     }
     let group = inputs
         .first()
@@ -90,7 +92,7 @@ pub(super) fn fitting(
         };
         total += score;
         taken.push(&channel.path);
-        measured.push(mapped(signal, channel));
+        measured.push(mapped(signal, channel, known));
     }
     if measured.is_empty() {
         return Ok(None);
@@ -154,11 +156,12 @@ fn named<'i>(
     Some((10.0, channel))
 }
 
-fn mapped(signal: &Signal, channel: &ChannelFacts) -> MappedChannel {
+fn mapped(signal: &Signal, channel: &ChannelFacts, known: &Known) -> MappedChannel {
+    let said = known.unit(&channel.path).map(str::to_owned);
     MappedChannel {
         id: signal.id.to_owned(),
         channel: channel.path.clone(),
-        unit: channel.unit.as_ref().map(|u| u.unit.clone()),
+        unit: said.or_else(|| channel.unit.as_ref().map(|u| u.unit.clone())),
     }
 }
 
@@ -195,7 +198,7 @@ fn score(signal: &Signal, input: bool, channel: &ChannelFacts) -> Option<f64> {
         return None;
     }
     let words = words(&channel.path);
-    let mut score = 0.0;
+    let mut score: f64 = 0.0;
     let expected = parse(signal.unit).ok()?;
     if let Some(unit) = channel.unit.as_ref().and_then(|u| parse(&u.unit).ok()) {
         conversion(&unit, &expected)?;
@@ -219,11 +222,16 @@ fn score(signal: &Signal, input: bool, channel: &ChannelFacts) -> Option<f64> {
             None => score -= 1.0,
         }
     }
-    // A plain `u` is what was put in, a plain `y` what came out.
+    // A plain `u` is what was put in, a plain `y` what came out: of a rate and its integral, the rate.
     let plain = if input { "u" } else { "y" };
     if hits == 0 && words.first().is_some_and(|w| w == plain) {
-        score += 2.5;
+        let rate = words.len() == 1 && signal.unit.ends_with("/s");
+        score = score.max(0.0) + if rate { 2.5 } else { 1.5 };
         hits = 1;
+    }
+    // A current jumps with the input, and is none of the signals that a plant has.
+    if words.iter().any(|w| CURRENTS.contains(&w.as_str())) && signal.unit != "A" {
+        return None;
     }
     if hits == 0 {
         return None;
@@ -244,6 +252,59 @@ fn score(signal: &Signal, input: bool, channel: &ChannelFacts) -> Option<f64> {
         score += 1.0;
     }
     Some(score)
+}
+
+/// Margin by which the best channel must lead, and the score that a name and a unit have together.
+const LEAD: f64 = 1.0;
+const SURE: f64 = 4.0;
+
+/// Whether the names and units of a log leave no doubt which channel a signal is.
+pub(super) fn sure(signal: &Signal, input: bool, inventory: &Inventory, taken: &[&str]) -> bool {
+    let free = |c: &&ChannelFacts| !c.is_time && !taken.contains(&c.path.as_str());
+    let scored = inventory.channels.iter().filter(free);
+    let mut scores: Vec<f64> = scored.filter_map(|c| score(signal, input, c)).collect();
+    scores.sort_by(|a, b| b.total_cmp(a));
+    match scores.as_slice() {
+        [best, second, ..] => *best >= SURE && best - second >= LEAD,
+        [best] => *best >= SURE,
+        [] => false,
+    }
+}
+
+/// Channels that a signal could be as well, the likeliest first: those of its unit or of none. Of what was measured, what
+/// is smooth comes before what jumps, as a state does before a current; inputs stand in the order of the file.
+pub(super) fn others<'i>(
+    signal: &Signal,
+    input: bool,
+    inventory: &'i Inventory,
+    taken: &[&str],
+) -> Vec<&'i ChannelFacts> {
+    let expected = parse(signal.unit).ok();
+    let fits = |c: &&ChannelFacts| {
+        let unit = c.unit.as_ref().and_then(|u| parse(&u.unit).ok());
+        let same = match (unit, &expected) {
+            (Some(unit), Some(expected)) => conversion(&unit, expected).is_some(),
+            _ => true,
+        };
+        let moves = c.range.is_some_and(|(low, high)| low < high);
+        c.kind == Kind::Number && !c.is_time && moves && same && !taken.contains(&c.path.as_str())
+    };
+    let mut found: Vec<&ChannelFacts> = inventory.channels.iter().filter(fits).collect();
+    let current = |c: &ChannelFacts| {
+        words(&c.path)
+            .iter()
+            .any(|w| CURRENTS.contains(&w.as_str()))
+    };
+    let rough = |c: &ChannelFacts| match input {
+        true => 0.0,
+        false => c.roughness.unwrap_or(f64::INFINITY),
+    };
+    found.sort_by(|a, b| {
+        current(a)
+            .cmp(&current(b))
+            .then(rough(a).total_cmp(&rough(b)))
+    });
+    found
 }
 
 /// The words of a path: `NT:/URCL/AppliedOutputVoltage` has `nt urcl applied output voltage`.

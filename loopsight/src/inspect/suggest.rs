@@ -9,7 +9,7 @@ use loopsight_model::model::Model as Composed;
 use loopsight_recordings::{ChannelFacts, Inventory, Kind, RecordingError, Source};
 
 use super::likely;
-use super::toml::GUESSED_PERIOD;
+use super::toml::{GUESSED_PERIOD, OTHERS};
 
 /// Signals that are filled in at most.
 const MOST: usize = 40;
@@ -159,17 +159,34 @@ impl Filling {
             .and_then(like)
             .or_else(best)
             .or_else(|| like(signal.id));
-        let (channel, guess) = match found {
-            Some(channel) => (channel.clone(), None),
-            None => {
-                let channel = free().find(|c| c.range.is_some_and(|(low, high)| low < high))?;
-                let guess = format!(
-                    "`{}` for `{}` is a guess: no channel has such a name",
-                    channel.path, signal.id
-                );
-                (channel.clone(), Some(guess))
-            }
+        let others = likely::others(signal, input, &self.inventory, &taken);
+        let channel = match found {
+            Some(channel) => channel.clone(),
+            None => (*others.first()?).clone(),
         };
+        let rest: Vec<String> = (others.iter().filter(|c| c.path != channel.path))
+            .take(OTHERS)
+            .map(|c| format!("`{}`", c.path))
+            .collect();
+        let doubtful = !likely::sure(signal, input, &self.inventory, &taken) && !rest.is_empty();
+        let guess = (found.is_none() || doubtful).then(|| {
+            let why = if found.is_none() {
+                ": no channel has such a name"
+            } else {
+                ""
+            };
+            let or = if rest.is_empty() {
+                ""
+            } else {
+                "; it could be "
+            };
+            format!(
+                "`{}` for `{}` is a guess{why}{or}{}",
+                channel.path,
+                signal.id,
+                rest.join(", ")
+            )
+        });
         self.guesses.extend(guess);
         Some(channel)
     }

@@ -4,27 +4,30 @@ use loopsight_core::unit::parse;
 use loopsight_model::registry;
 use loopsight_recordings::Inventory;
 
+use super::likely;
 use crate::answers::{FittingPlant, MappedChannel};
 
+/// Channels that are named beside a guess.
+pub(super) const OTHERS: usize = 6;
 /// Period that stands in a file where nobody knows it, s.
 pub(super) const GUESSED_PERIOD: f64 = 0.01;
 
 /// What stamps the rows.
 #[derive(Clone, Copy)]
-pub(super) enum Period {
-    /// The log itself.
-    Log,
+pub(super) enum Period<'t> {
+    /// The log itself; its unit, where somebody said it or it is a guess with a reason.
+    Log(Option<(&'t str, &'t str)>),
     /// The caller, s.
     Given(f64),
     /// Nothing: a guess.
     Guessed,
 }
 
-impl Period {
-    pub(super) fn new(stamps: bool, given: Option<f64>) -> Self {
+impl<'t> Period<'t> {
+    pub(super) fn new(stamps: bool, given: Option<f64>, unit: Option<(&'t str, &'t str)>) -> Self {
         match given {
             Some(period) => Period::Given(period),
-            None if stamps => Period::Log,
+            None if stamps => Period::Log(unit),
             None => Period::Guessed,
         }
     }
@@ -36,7 +39,7 @@ pub(super) fn model(
     plant: &FittingPlant,
     inventory: &Inventory,
     state: Option<&str>,
-    period: Period,
+    period: Period<'_>,
     named: bool,
 ) -> String {
     // A comment must stay on its line, whatever the file is called.
@@ -51,10 +54,15 @@ pub(super) fn model(
         "[log]".to_owned(),
     ];
     match period {
-        Period::Log => {
-            let time = inventory.channels.iter().find(|c| c.is_time);
-            if let Some(time) = time {
-                lines.push(format!("time = {}", column(&time.path, time.unit.as_ref().map_or(Some("s"), |_| None))));
+        Period::Log(said) => {
+            if let Some(time) = inventory.channels.iter().find(|c| c.is_time) {
+                let (unit, why) = match (said, &time.unit) {
+                    (Some((unit, why)), _) => (Some(unit), why),
+                    (None, Some(_)) => (None, ""),
+                    (None, None) => (Some("s"), ""),
+                };
+                let reason = if why.is_empty() { String::new() } else { format!(" # {why}") };
+                lines.push(format!("time = {}{reason}", column(&time.path, unit)));
             }
         }
         Period::Given(period) => lines.push(format!("period_s = {period:?}")),
@@ -69,7 +77,13 @@ pub(super) fn model(
     lines.push("[log.inputs]".to_owned());
     for input in &plant.inputs {
         let unit = unit(input);
-        lines.push(format!("{} = {}", input.id, column(&input.channel, unit)));
+        let doubt =
+            doubt(plant, input, true, inventory).map_or_else(String::new, |d| format!(" # {d}"));
+        lines.push(format!(
+            "{} = {}{doubt}",
+            input.id,
+            column(&input.channel, unit)
+        ));
     }
     for signal in &plant.measured {
         // What is the integral of another signal that was measured says nothing new, and disagrees
@@ -84,7 +98,9 @@ pub(super) fn model(
         }
         lines.push(String::new());
         lines.push(format!("[log.measured.{}]", signal.id));
-        lines.push(format!("column = {}", quoted(&signal.channel)));
+        let doubt = doubt(plant, signal, false, inventory).filter(|_| !named);
+        let doubt = doubt.map_or_else(String::new, |d| format!(" # {d}"));
+        lines.push(format!("column = {}{doubt}", quoted(&signal.channel)));
         match unit(signal) {
             Some(unit) => lines.push(format!("unit = {}", quoted(unit))),
             None => lines.push("# The log does not say its unit; taken as SI.".to_owned()),
@@ -92,6 +108,32 @@ pub(super) fn model(
     }
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// That a channel is a guess, and what else it could be; none where name and unit leave no doubt.
+fn doubt(
+    plant: &FittingPlant,
+    mapped: &MappedChannel,
+    input: bool,
+    inventory: &Inventory,
+) -> Option<String> {
+    let meta = registry::plants()
+        .into_iter()
+        .find(|meta| meta.id == plant.plant)?;
+    let mut signals = meta.inputs.iter().chain(meta.states).chain(meta.outputs);
+    let signal = signals.find(|s| s.id == mapped.id)?;
+    let all = plant.inputs.iter().chain(&plant.measured);
+    let taken: Vec<&str> = all
+        .map(|m| m.channel.as_str())
+        .filter(|c| *c != mapped.channel)
+        .collect();
+    if likely::sure(signal, input, inventory, &taken) {
+        return None;
+    }
+    let others = likely::others(signal, input, inventory, &taken);
+    let others = others.iter().filter(|c| c.path != mapped.channel);
+    let shown: Vec<String> = others.take(OTHERS).map(|c| quoted(&c.path)).collect();
+    (!shown.is_empty()).then(|| format!("a guess; it could be {}", shown.join(", ")))
 }
 
 /// The measured signal whose integral a signal is.

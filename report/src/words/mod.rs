@@ -41,6 +41,7 @@
 //! | [`fit`] | parameters found from a log |
 //! | [`diagnosis`] | what a model lacks |
 //! | [`improvement`] | a model with what it lacked |
+//! | [`inventory`] | what is in a log |
 //! | [`plan`] | an experiment |
 //! | [`run`] | a loop at work |
 //!
@@ -55,6 +56,7 @@ pub mod feedforward;
 pub mod fit;
 mod force;
 pub mod improvement;
+pub mod inventory;
 mod number;
 mod place;
 pub mod plan;

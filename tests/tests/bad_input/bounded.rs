@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Desk, EXPERIMENT, LOOP, log_text};
+use super::{Desk, EXPERIMENT, LOOP, log_text, model_text};
 
 /// As [`Desk::refused_saying`], at once: a second of an idle machine, some more of a busy one.
 fn refused_at_once(desk: &Desk, arguments: &[&str], words: &[&str]) {
@@ -23,6 +23,13 @@ fn samples_far_apart() {
         }
     }
     desk.write("far.csv", far);
+    // Stamps of which the model file says that they are seconds are believed.
+    let model = model_text().replacen(
+        "[log.",
+        "[log]\ntime = { column = \"time_s\", unit = \"s\" }\n[log.",
+        1,
+    );
+    desk.write("model.toml", model);
     for command in ["compare", "fit", "diagnose"] {
         let words = [
             "far.csv",

@@ -111,3 +111,44 @@ fn a_missing_measurement_is_named_and_left_out() {
         assert!(said["nrmse"].as_f64().unwrap() < 0.1, "{value}: {text}");
     }
 }
+
+/// Milliseconds in a column that says seconds: named with the remedy, which then reads the log.
+#[test]
+fn milliseconds_taken_for_seconds() {
+    let desk = Desk::new();
+    let stretched = |text: &str| -> String {
+        let row = |line: &str| match line.split_once(',') {
+            Some((time, rest)) if time != "time_s" => {
+                let stamp: f64 = time.parse().unwrap();
+                format!("{},{rest}\n", (1e3 * stamp).round())
+            }
+            _ => format!("{line}\n"),
+        };
+        text.lines().map(row).collect()
+    };
+    desk.write("ms.csv", stretched(&log_text()));
+    let remedy = "`time = { column = \"time_s\", unit = \"ms\" }`";
+    for words in [
+        &["compare", "model.toml", "ms.csv"],
+        &["fit", "model.toml", "ms.csv"],
+    ] {
+        desk.refused_saying(words, &["seem to be ms, not s", remedy]);
+    }
+    for (unit, right) in [("ms", true), ("s", false)] {
+        let map = format!("[log]\ntime = {{ column = \"time_s\", unit = \"{unit}\" }}\n");
+        let (head, rest) = model_text()
+            .split_once("[log.")
+            .map(|(a, b)| (a.to_owned(), b.to_owned()))
+            .unwrap();
+        desk.write("said.toml", format!("{head}{map}[log.{rest}"));
+        let words = ["compare", "said.toml", "ms.csv", "--json"].map(OsStr::new);
+        let output = desk.output(&words);
+        let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        // Whoever says seconds is believed.
+        assert_eq!(
+            said["fit_percent"].as_f64().unwrap() > 95.0,
+            right,
+            "{unit}: {said}"
+        );
+    }
+}

@@ -1,25 +1,38 @@
 //! `loopsight inspect`.
 
-use crate::answers::InspectedChannel;
+use std::io::{BufRead as _, IsTerminal as _};
+
 use crate::cli::arguments::InspectArguments;
 use crate::cli::{files, output};
 use crate::error::{Error, Result};
-use crate::{FitOptions, InspectOptions, Log, Model, Session, inspect, words};
+use crate::inspect::questions;
+use crate::words::report::inventory::facts;
+use crate::{FitOptions, InspectOptions, Log, Model, Session, inspect, inspect_file};
 
 pub(crate) fn run(arguments: &InspectArguments) -> Result<()> {
-    let input = std::slice::from_ref(&arguments.log);
-    files::check(&arguments.output, &[input])?;
-    let log = Log::read(&arguments.log)?;
+    files::check(
+        arguments.output.iter().chain(&arguments.html),
+        &[std::slice::from_ref(&arguments.log)],
+    )?;
     let mut options = InspectOptions::default();
     options.plant.clone_from(&arguments.plant);
     options.inputs.clone_from(&arguments.inputs);
     options.measured.clone_from(&arguments.measured);
     options.period_s = arguments.period;
-    let found = inspect(&log, &options)?;
+    options.units.clone_from(&arguments.units);
+    // A model file is fitted to the log, which is kept for that.
+    let (found, log) = match &arguments.output {
+        Some(_) => {
+            let log = Log::read(&arguments.log)?;
+            let options = asked(&log, &options, arguments)?;
+            (inspect(&log, &options)?, Some(log))
+        }
+        None => (inspect_file(&arguments.log, &options)?, None),
+    };
     let mut lines = vec![format!("{}: {}", found.file, found.summary)];
     lines.extend(found.notes.iter().map(|note| format!("  {note}")));
     lines.push(String::new());
-    lines.extend(found.channels.iter().map(line));
+    lines.extend((found.inventory.channels.iter()).map(|c| format!("  {}: {}", c.path, facts(c))));
     for plant in &found.plants {
         lines.push(String::new());
         lines.push(format!("{}:", plant.plant));
@@ -28,8 +41,8 @@ pub(crate) fn run(arguments: &InspectArguments) -> Result<()> {
             lines.push(format!("  {role} {} = {}", m.id, m.channel));
         }
     }
-    match (&arguments.output, &found.model_toml) {
-        (Some(out), Some(text)) => {
+    match (arguments.output.as_ref().zip(log), &found.model_toml) {
+        (Some((out, log)), Some(text)) => {
             // With the values of a fit it runs at once; without them it is what a fit begins with.
             let name = out.display().to_string();
             let fitted = Model::from_toml(&name, text)
@@ -62,39 +75,28 @@ pub(crate) fn run(arguments: &InspectArguments) -> Result<()> {
         }
         (None, None) => {}
     }
-    output::answer(&found, &lines.join("\n"), arguments.json)
+    output::answer(&found, &lines.join("\n"), arguments.json)?;
+    files::page(arguments.html.as_ref(), |foot| found.page(foot))
 }
 
-/// A channel on one line.
-fn line(channel: &InspectedChannel) -> String {
-    let mut parts = vec![format!("{} {}", channel.values, channel.kind)];
-    if let (Some(unit), Some(why)) = (&channel.unit, channel.unit_from) {
-        parts.push(match why {
-            "the file says so" => unit.clone(),
-            _ => format!("{unit} ({why})"),
-        });
+/// The options, with the answers of the person at the terminal, where there are both.
+fn asked(
+    log: &Log,
+    options: &InspectOptions,
+    arguments: &InspectArguments,
+) -> Result<InspectOptions> {
+    let person = std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
+    if !person || arguments.json {
+        return Ok(options.clone());
     }
-    if let Some(rate) = channel.rate_hz {
-        parts.push(format!("{} Hz", words::number(rate)));
-    }
-    if let (Some(min), Some(max)) = (channel.min, channel.max) {
-        parts.push(format!("{} to {}", words::number(min), words::number(max)));
-    }
-    if !channel.words.is_empty() {
-        parts.push(channel.words.join(" | "));
-    }
-    if channel.missing > 0.0 {
-        parts.push(format!(
-            "{} % missing",
-            words::number(100.0 * channel.missing)
-        ));
-    }
-    if channel.gaps > 0 {
-        let longest = words::number(channel.longest_gap_s);
-        parts.push(format!("{} pauses, the longest {longest} s", channel.gaps));
-    }
-    if channel.backwards > 0 {
-        parts.push(format!("time goes back {} times", channel.backwards));
-    }
-    format!("  {}: {}", channel.path, parts.join(", "))
+    output::note("What the log does not say is asked; Enter takes what stands in brackets.");
+    questions::answered(log, options, &mut |question| {
+        if !question.wrong.is_empty() {
+            output::note(&question.wrong);
+        }
+        output::note(&format!("{} [{}]", question.text, question.proposed));
+        let mut line = String::new();
+        let read = std::io::stdin().lock().read_line(&mut line);
+        read.is_ok_and(|bytes| bytes > 0).then_some(line)
+    })
 }
