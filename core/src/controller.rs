@@ -106,6 +106,10 @@ pub trait Controller<S: Real>: Send {
     /// Writes the command (one value per input, in the input's unit).
     ///
     /// `reference` and `measured` hold the controlled states.
+    ///
+    /// # Errors
+    ///
+    /// [`ControlError`] where no command can be computed. The loop then stops safely.
     fn step(
         &mut self,
         tick: &Tick<S>,

@@ -57,11 +57,24 @@ pub trait Driver<S: Real>: Send {
     /// The driver's own error.
     type Error: DriverError;
     /// Reads the measured signals in the order the driver was built for.
+    ///
+    /// # Errors
+    ///
+    /// The robot cannot be read; [`DriverError`] says what kind of fault it is. At the end of a recording that is
+    /// [`DriverFault::Finished`].
     fn read(&mut self, measured: &mut [S]) -> Result<Sample<S>, Self::Error>;
     /// Applies the inputs until the next write. Returns what was really applied in `applied`
     /// (limits, slew) so that the log holds what the plant saw.
+    ///
+    /// # Errors
+    ///
+    /// The command is not finite or the robot does not take it; [`DriverError`] says what kind of fault it is.
     fn write(&mut self, command: &[S], applied: &mut [S]) -> Result<(), Self::Error>;
     /// Brings the actuators to rest. Called at every end of a loop, also after an error.
+    ///
+    /// # Errors
+    ///
+    /// The actuators may not be at rest: the robot did not take the command.
     fn safe_stop(&mut self) -> Result<(), Self::Error>;
 }
 

@@ -284,6 +284,10 @@ where
     /// Waits for the next period, then reads, learns, supervises, controls and writes.
     ///
     /// On any error the driver has been stopped safely when this returns.
+    ///
+    /// # Errors
+    ///
+    /// [`TickError`] where driver or controller fail, or where the supervisor stops the loop.
     pub fn tick(&mut self, reference: &[S]) -> Result<TickRecord<'_, S>, TickError<D::Error, S>> {
         self.tick_towards(reference, reference)
     }
@@ -291,6 +295,10 @@ where
     /// As [`Loop::tick`], with the references that hold when the next command arrives at the plant:
     /// the controller gets `target`, [`AffineModel::ahead`] of time; `reference` is what holds now,
     /// for who watches or logs.
+    ///
+    /// # Errors
+    ///
+    /// As [`Loop::tick`].
     pub fn tick_towards(
         &mut self,
         reference: &[S],
@@ -406,6 +414,10 @@ where
     }
 
     /// Brings the actuators to rest.
+    ///
+    /// # Errors
+    ///
+    /// That of [`Driver::safe_stop`].
     pub fn stop(&mut self) -> Result<(), D::Error> {
         self.driver.safe_stop()
     }

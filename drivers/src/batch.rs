@@ -12,6 +12,11 @@ use crate::simulated::Simulated;
 /// `time[0]`; the inputs of the result are those applied, within the limits; a sample that gets lost is
 /// missing (NaN). `settings.model` is
 /// not used: `model` is the robot.
+///
+/// # Errors
+///
+/// [`BuildError`] where the settings do not suit the model, where `time` and `inputs` do not form a run, or where
+/// the simulation diverges.
 pub fn simulate_inputs(
     model: &Model,
     settings: &Simulated,

@@ -49,6 +49,10 @@ pub struct ReadError {
 const MOST_TEXT: u64 = 10_000_000;
 
 /// Reads a text file, with the reasons people meet spelled out.
+///
+/// # Errors
+///
+/// [`ReadError`] where the file is missing, unreadable, not text, or too large.
 pub fn read_text(path: &Path) -> Result<String, ReadError> {
     let error = |why: String| ReadError {
         path: path.to_owned(),
@@ -114,6 +118,10 @@ pub struct TomlSource {
 
 impl TomlSource {
     /// Parses the syntax of `text`.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] where the text is not TOML, with line and column.
     pub fn parse(file: &str, text: &str) -> Result<Self, Box<ConfigError>> {
         match Document::parse(text.to_owned()) {
             Ok(document) => Ok(Self {
@@ -135,6 +143,10 @@ impl TomlSource {
     }
 
     /// Reads the whole document as a `T`.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] where the document is not a `T`, with line, column and the nearest right name.
     pub fn read<T: DeserializeOwned>(&self) -> Result<T, Box<ConfigError>> {
         self.one_part_each()?;
         let deserializer = match toml::Deserializer::parse(&self.text) {

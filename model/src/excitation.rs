@@ -160,6 +160,10 @@ impl Excitation {
     /// assert_eq!([0.99, 1.0, 2.5].map(|t| steps.sample(t)), [0.0, 9.0, -9.0]);
     /// # Ok::<(), loopsight_model::registry::BuildError>(())
     /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError`] where a number is out of its range, or where a file would be needed.
     pub fn build(&self, signal: &str) -> Result<Sequence, BuildError> {
         let read: &ReadColumn<'_> = &no_files;
         self.build_at("", stream_of(signal), Driven { signal, read })
@@ -297,6 +301,10 @@ impl Excitation {
 
 /// One sequence per signal, in the order of `signals`; signals that are not given stay at 0. The
 /// key of an error is the path within the table, as in `voltage_right.prbs.hold_s`.
+///
+/// # Errors
+///
+/// [`BuildError`] where a signal is unknown, or an excitation cannot be built.
 pub fn build(
     given: &BTreeMap<String, Excitation>,
     signals: &[Signal],
@@ -305,6 +313,10 @@ pub fn build(
 }
 
 /// As [`build()`], where files can be read.
+///
+/// # Errors
+///
+/// As [`build()`], and where a file cannot be read.
 pub fn build_with(
     given: &BTreeMap<String, Excitation>,
     signals: &[Signal],

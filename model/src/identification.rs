@@ -50,6 +50,10 @@ pub enum IdentificationError {
 impl Identification {
     /// Estimators built from `part` for the free parameters of `model`, starting from the model's
     /// values (0 where there is none), for a loop with `period` (s).
+    ///
+    /// # Errors
+    ///
+    /// [`IdentificationError`] where the model has no regression, or a setting is wrong.
     pub fn new(
         model: &Model,
         scheme: Scheme,

@@ -27,6 +27,10 @@ pub type LimitSettings = BTreeMap<String, SignalLimits>;
 pub type BuiltLimits = (Option<Limits<Vec<f64>>>, Option<Limits<Vec<f64>>>);
 
 /// Checks the numbers; the key of an error is the path within the table.
+///
+/// # Errors
+///
+/// [`BuildError`] where a signal is unknown, or a limit is not above 0.
 pub fn build(
     given: &LimitSettings,
     inputs: &[Signal],

@@ -103,6 +103,10 @@ pub struct Composed {
 impl Composed {
     /// One tick at `time`, s: with the references that hold then, and for the controller those that
     /// hold when its command arrives, where the model knows how late that is.
+    ///
+    /// # Errors
+    ///
+    /// [`TickError`] where driver or controller fail, or where the supervisor stops the loop.
     pub fn tick(
         &mut self,
         time: f64,
@@ -118,11 +122,19 @@ impl Composed {
 
 impl LoopFile {
     /// Reads a loop file.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] where the document is not a loop file.
     pub fn parse(source: &TomlSource) -> Result<Self, Box<ConfigError>> {
         source.read()
     }
 
     /// Composes the loop; errors are placed in `source`.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] where a part cannot be built, or a number is wrong.
     pub fn compose(
         &self,
         source: &TomlSource,

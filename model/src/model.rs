@@ -66,12 +66,20 @@ impl std::fmt::Debug for Model {
 
 impl Model {
     /// Reads a model file.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError`] where the file cannot be read or is not a model file.
     pub fn load(path: &Path) -> Result<(Self, TomlSource), ModelError> {
         let text = read_text(path)?;
         Self::from_toml(&path.display().to_string(), &text)
     }
 
     /// Composes a model from TOML; `file` names it in messages.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError`] where the text is not a model file, or no plant is linked.
     pub fn from_toml(file: &str, text: &str) -> Result<(Self, TomlSource), ModelError> {
         crate::registry::check()?;
         let source = TomlSource::parse(file, text)?;
@@ -81,6 +89,10 @@ impl Model {
     }
 
     /// Composes a model from a parsed file; `source` places the errors.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] where a value is out of its range, or an effect or a sensor does not fit the plant.
     pub fn compose(file: &ModelFile, source: &TomlSource) -> Result<Self, Box<ConfigError>> {
         let prefix: [PathSegment; 2] = ["plant".into(), file.plant.meta().id.into()];
         let ready = file
@@ -174,6 +186,10 @@ impl Model {
     }
 
     /// Says what is measured: ids of signals with their sensors. An error is `(id, message, help)`.
+    ///
+    /// # Errors
+    ///
+    /// There is no signal with the id, or its sensor does not suit it.
     pub fn measure(
         &mut self,
         list: &[(String, Sensor)],
@@ -213,6 +229,10 @@ impl Model {
     }
 
     /// Index of a signal by id; the error is `(message, help)`.
+    ///
+    /// # Errors
+    ///
+    /// There is no signal with the id.
     pub fn find_signal(&self, id: &str) -> Result<usize, (String, Option<String>)> {
         signal_index(self.plant, id).ok_or_else(|| {
             let ids: Vec<&str> = signals(self.plant).map(|s| s.id).collect();

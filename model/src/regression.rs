@@ -99,6 +99,10 @@ struct Row {
 
 impl Regression {
     /// The regressions of `model` in its free parameters.
+    ///
+    /// # Errors
+    ///
+    /// [`RegressionError`] where the plant has no controlled states, or a free parameter enters non-linearly.
     pub fn new(model: &Model, scheme: Scheme) -> Result<Self, RegressionError> {
         if model.plant.controlled.is_empty() {
             return Err(RegressionError::NoControlledStates(
@@ -151,6 +155,11 @@ impl Regression {
     /// The regressions of `model` with its effects, in those free parameters that enter linearly; the
     /// others keep their values. `period` (s) is that of the loop. Where nothing acts between command
     /// and rate it is that of [`Regression::new`].
+    ///
+    /// # Errors
+    ///
+    /// [`RegressionError`] where the plant has no controlled states, or a free parameter without a value enters
+    /// non-linearly.
     pub fn with_effects(
         model: &Model,
         scheme: Scheme,

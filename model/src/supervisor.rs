@@ -69,6 +69,10 @@ impl Default for SupervisorSettings {
 impl SupervisorSettings {
     /// A supervisor for a loop with `model` and `rows` regressions; the key of an error is the path
     /// within the table.
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError`] where a number is out of its range, or a signal is unknown.
     pub fn build(
         &self,
         model: &Model,

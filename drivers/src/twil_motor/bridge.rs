@@ -15,10 +15,22 @@ pub trait Bridge<S: Real> {
     type Error: fmt::Debug;
     /// Puts this share of the supply on the motor, from -1 to 1; returns the share that the steps of
     /// the PWM allow.
+    ///
+    /// # Errors
+    ///
+    /// A pin failed.
     fn drive(&mut self, share: S) -> Result<S, Self::Error>;
     /// Opens the bridge where it can be opened: the motor turns freely.
+    ///
+    /// # Errors
+    ///
+    /// A pin failed.
     fn coast(&mut self) -> Result<(), Self::Error>;
     /// Shorts the motor.
+    ///
+    /// # Errors
+    ///
+    /// A pin failed.
     fn brake(&mut self) -> Result<(), Self::Error>;
 }
 

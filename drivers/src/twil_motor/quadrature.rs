@@ -11,6 +11,10 @@ pub trait Quadrature {
     /// The counter's own error.
     type Error: fmt::Debug;
     /// Where the shaft is, in `[0, range)`.
+    ///
+    /// # Errors
+    ///
+    /// The counter cannot be read.
     fn position(&mut self) -> Result<u32, Self::Error>;
     /// After how many counts the position starts over: `2^32`, or `2^16` of a 16-bit timer.
     fn range(&self) -> u64 {

@@ -10,6 +10,10 @@ pub trait Supply<S: Real> {
     /// The meter's own error.
     type Error: fmt::Debug;
     /// The present voltage, V.
+    ///
+    /// # Errors
+    ///
+    /// The supply cannot be measured.
     fn volts(&mut self) -> Result<S, Self::Error>;
 }
 

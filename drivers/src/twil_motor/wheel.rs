@@ -181,12 +181,28 @@ pub trait Wheels<S: Real> {
     /// How many there are.
     fn count(&self) -> usize;
     /// As [`Wheel::drive`], of the wheel `index`.
+    ///
+    /// # Errors
+    ///
+    /// That of the wheel, with its number.
     fn drive(&mut self, index: usize, volts: S, supply: S, period: S) -> Result<S, Self::Error>;
     /// As [`Wheel::counts`], of the wheel `index`.
+    ///
+    /// # Errors
+    ///
+    /// That of the wheel, with its number.
     fn counts(&mut self, index: usize) -> Result<i32, Self::Error>;
     /// As [`Wheel::coast`], of all wheels, whatever becomes of one of them; the first error is told.
+    ///
+    /// # Errors
+    ///
+    /// That of the first wheel that failed.
     fn coast(&mut self) -> Result<(), Self::Error>;
     /// As [`Wheel::brake`], of all wheels, whatever becomes of one of them; the first error is told.
+    ///
+    /// # Errors
+    ///
+    /// That of the first wheel that failed.
     fn brake(&mut self) -> Result<(), Self::Error>;
 }
 

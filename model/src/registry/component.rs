@@ -34,6 +34,10 @@ pub trait PlantPart: Debug + Send + Sync {
     /// The equations.
     fn dynamics(&self) -> &'static dyn AnyDynamics;
     /// The plant ready to be composed; an error where what the file says of it cannot be.
+    ///
+    /// # Errors
+    ///
+    /// [`Mistake`] where the table does not define a plant.
     fn ready(&self) -> Result<ReadyPlant, Mistake> {
         let (meta, values) = (self.meta(), self.values().clone());
         let set = values.set.checked_sub(1);
@@ -78,6 +82,10 @@ pub trait EffectPart: Debug + Send + Sync {
     }
     /// The effect ready to act at these channels of a plant; an error where what the file says of
     /// it cannot be.
+    ///
+    /// # Errors
+    ///
+    /// [`Mistake`] where the table does not define an effect that can act there.
     fn ready(
         &self,
         plant: &'static PlantMeta,

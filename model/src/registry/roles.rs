@@ -17,6 +17,10 @@ pub trait EstimatorPart: Debug + Send + Sync {
     /// The declaration.
     fn meta(&self) -> &'static PartMeta;
     /// Builds one for `theta.len()` parameters, starting from `theta`.
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError`] where a setting is out of its range.
     fn build(&self, theta: &[f64]) -> Result<Box<dyn Estimator<f64>>, BuildError>;
 }
 
@@ -26,6 +30,10 @@ pub trait ControllerPart: Debug + Send + Sync + Any {
     /// The declaration.
     fn meta(&self) -> &'static PartMeta;
     /// Builds it for a model and a period (s).
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError`] where a setting is out of its range or does not suit the model.
     fn build(&self, model: &Model, period: f64) -> Result<Box<dyn Controller<f64>>, BuildError>;
     /// Sentences for reports: what was asked for and what the design will give.
     fn notes(&self) -> Vec<String> {
@@ -103,6 +111,10 @@ pub trait DriverPart: Debug + Send + Sync + Any {
     /// The declaration.
     fn meta(&self) -> &'static PartMeta;
     /// Builds it.
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError`] where a setting is out of its range or does not suit the model, or a file cannot be read.
     fn build(&self, context: &DriverContext<'_>) -> Result<HostDriver, BuildError>;
     /// True when the driver's time is simulated: the loop then runs as fast as it can.
     fn is_simulated(&self) -> bool;
@@ -126,6 +138,10 @@ pub trait DriverPart: Debug + Send + Sync + Any {
     }
     /// Builds it, and the controller of the same loop: each by itself, where they need not know of each
     /// other.
+    ///
+    /// # Errors
+    ///
+    /// [`HalfError`], which says whether the driver or the controller cannot be built.
     fn build_with(&self, controller: &dyn ControllerPart, context: &DriverContext<'_>) -> Halves {
         let controller = controller
             .build(context.model, context.period)
