@@ -28,7 +28,7 @@ pub enum CompareError {
     /// There is no sample.
     #[error("the recording has no sample")]
     NoSamples,
-    /// The simulation left the finite numbers.
+    /// The simulation diverged.
     #[error(
         "the free run{} diverges after {time:.3} s: the model is unstable with these parameters",
         of_run(run)

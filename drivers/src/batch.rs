@@ -59,7 +59,7 @@ pub fn simulate_inputs(
         if !robot.measure(row) {
             return Err(BuildError::at(
                 "model",
-                format!("the robot left the finite numbers before {} s", time[k]),
+                format!("the simulated robot diverged before {} s", time[k]),
             )
             .help("its parameters make it unstable"));
         }
@@ -249,6 +249,6 @@ mod tests {
         );
         let error =
             simulate_inputs(&model, &Simulated::default(), &[0.0, 1.0], &[1.0; 2]).unwrap_err();
-        assert!(error.message.contains("left the finite numbers"), "{error}");
+        assert!(error.message.contains("diverged before"), "{error}");
     }
 }

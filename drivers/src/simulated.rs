@@ -294,7 +294,7 @@ impl Driver<f64> for SimulatedDriver {
         } else {
             Err(HostDriverError {
                 fault: DriverFault::Io,
-                message: format!("the simulated robot left the finite numbers before {time} s"),
+                message: format!("the simulated robot diverged before {time} s"),
             })
         }
     }

@@ -5,7 +5,7 @@ use loopsight_diagnosis::{Comparison, Diagnosis, Fit, Improvement, Plan};
 pub(crate) use loopsight_report::words as report;
 #[cfg(feature = "cli")]
 pub(crate) use report::hundredths as percent;
-use report::run::{Learned, Regression, RunFigures, Tracked};
+use report::run::{Learned, RegressionFigures, RunFigures, Tracked};
 pub(crate) use report::{faults, number};
 
 use crate::answers::{ReferenceStep, RunAnswer, Tracking};
@@ -75,7 +75,7 @@ pub(crate) fn figures(run: &RunAnswer) -> RunFigures<'_> {
     });
     let regressions = run.innovation.iter().enumerate().map(|(i, innovation)| {
         let learning = run.learning.get(i);
-        Regression {
+        RegressionFigures {
             id: &innovation.id,
             unit: &innovation.unit,
             innovation_rms: innovation.rms,

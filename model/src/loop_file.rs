@@ -23,7 +23,7 @@ use loopsight_core::{
     AffineModel, Clock, Controller, Loop, Signal, SimulatedClock, SystemClock, TickError,
 };
 
-pub use watch::Watch;
+pub use watch::LoopSupervision;
 
 /// A loop file, as written.
 #[derive(Debug, Serialize, Deserialize)]
@@ -61,7 +61,7 @@ pub struct LoopFile {
     /// Limits of inputs and of the controlled signals' references, by signal.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub limits: LimitSettings,
-    /// What watches over the loop: a table, or `false`; see [`LoopFile::watch`] for a file that says nothing.
+    /// The supervisor: a table, or `false`; see [`LoopFile::supervision`] for a file that says nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub supervisor: Option<Supervision>,
     /// Where the log is written, relative to the loop file.
@@ -250,7 +250,7 @@ impl LoopFile {
         if !self.driver.is_simulated() {
             self.limited(source, model)?;
         }
-        let watch = self.watch();
+        let watch = self.supervision();
         let judges_learning = watch.as_ref().is_some_and(|w| w.learning);
         let rows = identification.as_ref().filter(|_| judges_learning);
         let rows = rows.map_or(0, Identification::len);

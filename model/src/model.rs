@@ -21,7 +21,7 @@ use crate::registry::{AnyDynamics, HostReal};
 use crate::sensor::Sensor;
 pub use attached::{Attached, MeasuredSignal};
 pub use error::ModelError;
-pub use file::{FitOptions, ModelFile, SimulationOptions};
+pub use file::{FitTable, ModelFile, SimulationTable};
 pub use loopsight_core::{Tie, Unshown};
 pub use parameter::ModelParameter;
 pub(crate) use signals::signal_index;

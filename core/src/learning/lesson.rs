@@ -58,7 +58,7 @@ impl fmt::Display for Withheld {
             Withheld::NoRegressor => "no regressor yet",
             Withheld::Stale => "the sample is stale",
             Withheld::Saturated => "an actuator saturates",
-            Withheld::HeldCommand => "the last command is held",
+            Withheld::HeldCommand => "the last command is repeated",
             Withheld::NotFinite => "a number is not finite",
             Withheld::DeadZone => "the innovation is within the dead zone",
             Withheld::Unexcited => "nothing is excited",

@@ -157,7 +157,7 @@ pub(super) static TABLES: [PartMeta; 3] = [
 #[cfg(test)]
 mod tests {
     use loopsight_model::log_map::{Column, LogMap, Measured};
-    use loopsight_model::model::{FitOptions, SimulationOptions};
+    use loopsight_model::model::{FitTable, SimulationTable};
     use loopsight_model::sensor::Encoder;
     use serde::de::DeserializeOwned;
 
@@ -207,8 +207,8 @@ mod tests {
             table.settings.iter().map(|s| s.id.to_owned()).collect()
         };
         assert_eq!(told("log"), log);
-        assert_eq!(told("fit"), keys::<FitOptions>(""));
-        assert_eq!(told("simulation"), keys::<SimulationOptions>(""));
+        assert_eq!(told("fit"), keys::<FitTable>(""));
+        assert_eq!(told("simulation"), keys::<SimulationTable>(""));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::supervisor::{Supervision, SupervisorSettings};
 
 /// The supervisor of a loop.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Watch {
+pub struct LoopSupervision {
     /// How.
     pub settings: SupervisorSettings,
     /// It decides whether what is learned is used.
@@ -25,20 +25,20 @@ impl LoopFile {
     /// The supervisor of the loop, also where the file has none. Then a loop that uses what it learns has a supervisor
     /// with the defaults; any other is stopped where nothing is measured any more or a signal goes the wrong way. A
     /// log that is played back needs none.
-    pub fn watch(&self) -> Option<Watch> {
+    pub fn supervision(&self) -> Option<LoopSupervision> {
         let taught = self
             .learning
             .as_ref()
             .is_some_and(|l| l.certainty_equivalence);
         match &self.supervisor {
             Some(Supervision::Nobody) => None,
-            Some(Supervision::By(settings)) => Some(Watch {
+            Some(Supervision::By(settings)) => Some(LoopSupervision {
                 settings: settings.clone(),
                 learning: true,
                 assumed: None,
             }),
             None if !self.driver.is_driven() => None,
-            None if taught => Some(Watch {
+            None if taught => Some(LoopSupervision {
                 settings: SupervisorSettings::of_learning(self.period_s),
                 learning: true,
                 assumed: Some(OF_LEARNING),
@@ -49,7 +49,7 @@ impl LoopFile {
                 if self.driver.runs_law() {
                     settings.stale_s = f64::INFINITY;
                 }
-                Some(Watch {
+                Some(LoopSupervision {
                     settings,
                     learning: false,
                     assumed: Some(OF_ANY),

@@ -22,16 +22,16 @@ pub struct ModelFile {
     pub log: LogMap,
     /// How the model is integrated.
     #[serde(default)]
-    pub simulation: SimulationOptions,
+    pub simulation: SimulationTable,
     /// What a fit estimates.
     #[serde(default)]
-    pub fit: FitOptions,
+    pub fit: FitTable,
 }
 
 /// `[simulation]`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SimulationOptions {
+pub struct SimulationTable {
     /// Longest integration step, s; by default the plant's own
     /// ([`Plant::MAX_STEP_S`](loopsight_core::Plant::MAX_STEP_S)), or longer where samples are far apart and
     /// steps of half the length come to the same place.
@@ -42,7 +42,7 @@ pub struct SimulationOptions {
 /// `[fit]`: parameters that a fit estimates or freezes, where this differs from their declaration.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FitOptions {
+pub struct FitTable {
     /// Estimated though declared as known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub free: Vec<String>,

@@ -4,7 +4,7 @@ use loopsight_diagnosis::Advice;
 
 /// An experiment and the reasons for it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Recording {
+pub struct AdvisedRecording {
     /// What to record.
     pub experiment: String,
     /// Why; one experiment may answer several questions.
@@ -12,14 +12,14 @@ pub struct Recording {
 }
 
 /// Advice by experiment, each with all its reasons; what is said twice stands once.
-pub fn recordings<'a>(advice: impl IntoIterator<Item = &'a Advice>) -> Vec<Recording> {
-    let mut all: Vec<Recording> = Vec::new();
+pub fn recordings<'a>(advice: impl IntoIterator<Item = &'a Advice>) -> Vec<AdvisedRecording> {
+    let mut all: Vec<AdvisedRecording> = Vec::new();
     for one in advice {
         let because = one.why.clone();
         match all.iter_mut().find(|r| r.experiment == one.experiment) {
             Some(found) if found.because.contains(&because) => {}
             Some(found) => found.because.push(because),
-            None => all.push(Recording {
+            None => all.push(AdvisedRecording {
                 experiment: one.experiment.clone(),
                 because: vec![because],
             }),

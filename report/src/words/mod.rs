@@ -63,7 +63,7 @@ pub mod plan;
 pub mod run;
 mod table;
 
-pub use advice::{Recording, recordings};
+pub use advice::{AdvisedRecording, recordings};
 pub use diagnosis::Said;
 pub use faults::{fault, faults, severity};
 pub use number::{ASTRAY, error, hundredths, number, percent, quantity, rounded, with_error};

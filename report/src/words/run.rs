@@ -31,7 +31,7 @@ pub struct RunFigures<'a> {
     /// The parameters that were learned.
     pub learned: Vec<Learned<'a>>,
     /// The regressions that they were learned from.
-    pub regressions: Vec<Regression<'a>>,
+    pub regressions: Vec<RegressionFigures<'a>>,
     /// What happened when, s.
     pub events: Vec<(f64, &'a str)>,
     /// Sentences that belong to the run.
@@ -69,7 +69,7 @@ pub struct Learned<'a> {
 
 /// What a regression learned from.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Regression<'a> {
+pub struct RegressionFigures<'a> {
     /// Its output.
     pub id: &'a str,
     /// Unit of its output.
@@ -255,7 +255,7 @@ fn learned(learned: &[Learned]) -> String {
     table(&head, &rows)
 }
 
-fn regressions(regressions: &[Regression]) -> String {
+fn regressions(regressions: &[RegressionFigures]) -> String {
     let rows: Vec<Vec<String>> = regressions
         .iter()
         .map(|r| {
@@ -398,13 +398,13 @@ mod tests {
                 value: -12.5,
                 interval95: Some([-13.0, -12.0]),
             }],
-            regressions: vec![Regression {
+            regressions: vec![RegressionFigures {
                 id: "speed",
                 unit: "m/s^2",
                 innovation_rms: Some(0.3),
                 learned: 0.9,
                 withheld: vec![("no_regressor", 0.04), ("unexcited", 0.06)],
-                ..Regression::default()
+                ..RegressionFigures::default()
             }],
             events: events
                 .chain(names.iter().map(|name| (40.0, name.as_str())))

@@ -17,7 +17,7 @@ use loopsight_model::excitation::{Between, Excitation};
 use loopsight_model::identification::LearningSettings;
 use loopsight_model::log_map::{Column, ColumnMap, Hold, LogMap, Measured, Ranges};
 use loopsight_model::loop_file::LoopFile;
-use loopsight_model::model::{FitOptions, Model, ModelFile, SimulationOptions, misfit};
+use loopsight_model::model::{FitTable, Model, ModelFile, SimulationTable, misfit};
 use loopsight_model::registry::{
     ControllerPart, DriverPart, EstimatorPart, effects, parts as linked, plants,
 };
@@ -339,8 +339,8 @@ fn measured() -> impl Strategy<Value = Measured> {
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Tables {
     log: LogMap,
-    simulation: SimulationOptions,
-    fit: FitOptions,
+    simulation: SimulationTable,
+    fit: FitTable,
 }
 
 proptest! {
@@ -369,8 +369,8 @@ proptest! {
                 inputs,
                 measured,
             },
-            simulation: SimulationOptions { max_step_s },
-            fit: FitOptions {
+            simulation: SimulationTable { max_step_s },
+            fit: FitTable {
                 free,
                 fixed,
                 tied: Vec::new(),
