@@ -137,23 +137,34 @@ impl SupervisorSettings {
             (rows, controlled.len()),
             tracking.map(|limit| limit.unwrap_or(free)).collect(),
             (range(0, -free), range(1, free)),
-            shafts(model).1,
+            {
+                let shafts = shafts(model);
+                (shafts.rows, shafts.counts)
+            },
             |length| vec![0.0; length],
         ))
     }
 }
 
-/// What may freeze, by name, and the matrix that gives its speeds from the controlled signals, row by
-/// row: the shafts of the encoders where all controlled signals come from such, and the signals.
-fn shafts(model: &Model) -> (Vec<String>, Vec<f64>) {
+/// What may freeze: the shafts of the encoders where all controlled signals come from such, and the signals.
+struct Shafts {
+    names: Vec<String>,
+    /// The matrix that gives the speeds from the controlled signals, row by row.
+    rows: Vec<f64>,
+    /// Angle of one count; 0 of what is no shaft.
+    counts: Vec<f64>,
+}
+
+fn shafts(model: &Model) -> Shafts {
     let n = model.plant.controlled.len();
     let measured = model.measured.iter().take(n);
-    let mut names: Vec<String> = Vec::new();
+    let (mut names, mut counts) = (Vec::<String>::new(), Vec::new());
     for m in measured.clone() {
         if let Sensor::EncoderCounts(encoder) = &m.sensor {
             for shaft in encoder.of.keys() {
                 if !names.contains(shaft) {
                     names.push(shaft.clone());
+                    counts.push(encoder.resolution());
                 }
             }
         }
@@ -172,16 +183,24 @@ fn shafts(model: &Model) -> (Vec<String>, Vec<f64>) {
     match inverse {
         // Column by column, the transpose is the inverse row by row.
         Some(inverse) => rows.extend_from_slice(inverse.transpose().as_slice()),
-        None => names.clear(),
+        None => {
+            names.clear();
+            counts.clear();
+        }
     }
+    counts.resize(names.len() + n, 0.0);
     names.extend(measured.map(|m| m.signal.id.to_owned()));
     rows.extend_from_slice(DMatrix::<f64>::identity(n, n).as_slice());
-    (names, rows)
+    Shafts {
+        names,
+        rows,
+        counts,
+    }
 }
 
 /// Names of what a supervised loop may find frozen, for [`described`].
 pub fn turning(model: &Model) -> Vec<String> {
-    shafts(model).0
+    shafts(model).names
 }
 
 /// Every key of `given` is one of `ids`.

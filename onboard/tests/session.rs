@@ -388,6 +388,32 @@ fn a_configuration_that_cannot_be_used_is_refused_by_name() {
     }
 }
 
+/// A range whose ends are no numbers bounds nothing: what it would learn could be anything.
+#[test]
+fn an_infinite_range_of_learning_is_refused() {
+    let open = f32::INFINITY;
+    for [low, high] in [
+        [-open, -open],
+        [open, open],
+        [-open, open],
+        [-open, 1.0],
+        [-20.0, open],
+        [f32::NAN, 1.0],
+    ] {
+        let mut line = Line::default();
+        line.send(&hello(SESSION));
+        let mut spoilt = configuration();
+        let learning = spoilt.learning.as_mut().unwrap();
+        (learning.low[0], learning.high[0]) = (low, high);
+        let said = line.send(&configure(SESSION, spoilt));
+        let [Reply::Stopped { reason, .. }] = said[..] else {
+            panic!("{said:?} to [{low}, {high}]")
+        };
+        assert_eq!(reason, Reason::Configuration(Unusable::Learning));
+        assert_eq!(line.robot.output(), None);
+    }
+}
+
 /// A better model, sent while it drives: no jump of the command beyond what the model's change asks for.
 #[test]
 fn a_model_is_improved_on_the_run() {

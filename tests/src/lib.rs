@@ -8,6 +8,7 @@
 )]
 
 pub mod balance;
+pub mod damage;
 pub mod json_schema;
 pub mod loops;
 

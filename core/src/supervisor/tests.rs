@@ -80,6 +80,11 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
+        Self::counting(0.0)
+    }
+
+    /// With an encoder at the first shaft, by the angle of one count.
+    fn counting(count: f32) -> Self {
         let free = f32::INFINITY;
         Self {
             supervisor: Supervisor::new(
@@ -88,8 +93,8 @@ impl Bench {
                 (1, 2),
                 [free; 2],
                 ([-9.0, -free], [9.0, free]),
-                // The second shaft turns with the difference of the signals.
-                [1.0, 0.0],
+                // The second shaft turns with the difference of the signals; it has no encoder.
+                ([1.0, 0.0], [count, 0.0]),
                 |_| [0.0; 2],
             ),
             observer: Script::default(),
@@ -272,6 +277,34 @@ fn a_shaft_flat_out_or_held_by_friction_is_not_frozen_at_once() {
         } else {
             // What it is stopped for is that it does not follow.
             assert_eq!(event.cause, Cause::Tracking(0));
+        }
+    }
+}
+
+/// A count is the least change that an encoder can show: a shaft that went by one, and stands, came to rest as gradually
+/// as can be seen. From two counts it dropped.
+#[test]
+fn a_shaft_that_stops_within_a_count_came_to_rest() {
+    // One count within a period is 0.2, more than a tenth of what is asked for.
+    let count = 0.2;
+    for (counts, dropped, dead) in [
+        (0.0, count, true),
+        (count * PERIOD, count, false),
+        (count * PERIOD, 2.0 * count, true),
+    ] {
+        let mut bench = Bench::counting(counts);
+        bench.still = true;
+        bench.error = dropped - 1.0;
+        assert_eq!(bench.run(2.0 * PERIOD), None);
+        bench.error = -1.0;
+        let (time, event) = bench.run(3.0).unwrap();
+        if dead {
+            assert_eq!(event.cause, Cause::Frozen(0), "{counts} {dropped}");
+            assert!((0.3..0.4).contains(&time), "{time} s");
+        } else {
+            // What it is stopped for is that it does not follow.
+            assert_eq!(event.cause, Cause::Tracking(0));
+            assert!(time > 0.9, "{time} s");
         }
     }
 }

@@ -13,6 +13,10 @@ const STILL: f64 = 1e-6;
 /// Share of the largest speed asked for below which a shaft may well stand.
 const MATTERS: f64 = 0.1;
 
+/// Counts of an encoder by which a speed may change within a period and still have changed as little as can be seen: one,
+/// and a half for what rounding adds.
+const COUNTS: f64 = 1.5;
+
 /// Times as long a shaft may keep its speed that has a reason to: one that turns the right way with all there is (a
 /// constant voltage gives a constant speed, and a coarse encoder the same count), and one that came to rest
 /// gradually, which dry friction holds until the integrator has wound up that far.
@@ -87,6 +91,8 @@ pub struct Supervisor<S, B> {
     off_for: B,
     /// Speed of each shaft from the controlled signals, row by row.
     shafts: B,
+    /// Angle of one count of each shaft's encoder; 0 where there is none.
+    counts: B,
     /// By shaft: how long it has kept its speed, that speed, by how much it changed last within a period, and
     /// the largest one asked for so far.
     frozen_for: B,
@@ -110,7 +116,8 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
     /// signals. `tracking` has a
     /// limit per controlled signal, `range` the least and greatest values of the measured ones
     /// (infinite: none). `shafts` turns the controlled signals into the speeds of the shafts whose
-    /// encoders they come from, row by row, and into themselves.
+    /// encoders they come from, row by row, and into themselves; `counts` has the angle of one count of each (0: no
+    /// encoder), the least change that its speed can show in a period.
     /// Buffers of a given length or longer come from `zeros`.
     pub fn new(
         thresholds: Thresholds<S>,
@@ -118,7 +125,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
         (rows, controlled): (usize, usize),
         tracking: B,
         range: (B, B),
-        shafts: B,
+        (shafts, counts): (B, B),
         zeros: impl Fn(usize) -> B,
     ) -> Self {
         let n = controlled.max(1);
@@ -134,6 +141,7 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
             change: zeros(turning),
             largest_speed: zeros(turning),
             shafts,
+            counts,
             reference: zeros(n),
             tracking,
             low: range.0,
@@ -186,7 +194,9 @@ impl<S: Real, B: AsRef<[S]> + AsMut<[S]> + Clone> Supervisor<S, B> {
             if !stands {
                 *change = (is - last).abs();
             }
-            let came_to_rest = is.abs() <= slow && *change <= slow;
+            // A dead encoder drops from its speed to nothing; less than a count is seen of nobody.
+            let count = self.counts.as_ref().get(i).copied().unwrap_or(S::zero()) / period;
+            let came_to_rest = is.abs() <= slow && *change <= slow.max(count * S::of(COUNTS));
             let flat_out = saturated && is * wanted > S::zero();
             let matters = wanted.abs() > *largest * S::of(MATTERS);
             let should = matters && (wanted - is).abs() > wanted.abs() * S::of(0.5);

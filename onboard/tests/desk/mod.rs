@@ -11,6 +11,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -34,6 +35,8 @@ pub(crate) struct Desk {
     pub(crate) supply: fn(u32) -> f32,
     /// The tick from which on it says that it measures what is no number.
     pub(crate) mad_from: Option<u32>,
+    /// When it heard each step of its host.
+    pub(crate) heard: Arc<Mutex<Vec<Instant>>>,
     /// Its periods are those of a clock, whether its host says something or not.
     pub(crate) by_clock: bool,
     ticks: u32,
@@ -73,6 +76,7 @@ impl Desk {
             supply: |_| 12.0,
             mad_from: None,
             by_clock: false,
+            heard: Arc::default(),
             ticks: 0,
         }
     }
@@ -97,6 +101,7 @@ impl Desk {
                     .take(*byte, &mut |reply| said.push(reply.clone()));
                 if let Some(Ok(Request::Step(_))) = requests.take(*byte) {
                     self.steps = self.steps.saturating_sub(1);
+                    self.heard.lock().unwrap().push(Instant::now());
                     while !self.by_clock && self.period(&mut said) {}
                 }
             }

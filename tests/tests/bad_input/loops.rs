@@ -208,6 +208,13 @@ fn spoilt_loops() {
             &["lower end first", "spoilt.toml:"],
         ),
         (
+            format!("{LOOP}\n[estimator.rls]\n[learning]\nrange = {{ K_A = [-inf, -inf] }}\n"),
+            &[
+                "`K_A` is [-inf, -inf], expected [low, high]",
+                "spoilt.toml:",
+            ],
+        ),
+        (
             format!("{LOOP}\n[limits]\nvoltage_rigth = {{ magnitude = 6.0 }}\n"),
             &["voltage_rigth", "did you mean `voltage_right`?"],
         ),
