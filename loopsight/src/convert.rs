@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+use loopsight_model::log_map::{LogMap, Measured};
+use loopsight_model::model::{MeasuredSignal, Model as Composed};
+use loopsight_model::sensor::Sensor;
 use loopsight_recordings::{LogWriter, header, write_csv};
 
 use crate::answers::{Answer, ConvertAnswer};
@@ -67,12 +70,13 @@ impl Session {
         Ok(ConvertAnswer {
             schema: ConvertAnswer::SCHEMA,
             summary: format!(
-                "{} of {}: {} runs, {samples} samples over {} s, columns {}.",
+                "{} of {}: {} runs, {samples} samples over {} s, columns {}.{}",
                 path.display(),
                 data.log,
                 data.runs.len(),
                 words::number(duration_s),
-                columns.join(", ")
+                columns.join(", "),
+                sensors(&data.model)
             ),
             file: path.display().to_string(),
             runs: data.runs.iter().map(|run| run.name().to_owned()).collect(),
@@ -81,6 +85,30 @@ impl Session {
             columns,
             written,
         })
+    }
+}
+
+/// How the numbers were made, which no column says: the `[log]` of a model that reads the file. Empty where all are
+/// instantaneous.
+fn sensors(model: &Composed) -> String {
+    // All of them: a list of some would leave out the others.
+    let made = model.measured.iter().any(|m| m.sensor != Sensor::default());
+    let entry = |m: &MeasuredSignal| {
+        let measured = Measured {
+            sensor: m.sensor.clone(),
+            ..Measured::default()
+        };
+        (m.signal.id.to_owned(), measured)
+    };
+    let map = LogMap {
+        measured: model.measured.iter().map(entry).collect(),
+        ..LogMap::default()
+    };
+    match map.to_toml().filter(|_| made) {
+        Some(text) => {
+            format!(" How they were made belongs into the model file that reads them:\n\n{text}")
+        }
+        None => String::new(),
     }
 }
 
@@ -122,5 +150,27 @@ mod tests {
         }
         let error = before.convert(folder.path().join("si.xls")).unwrap_err();
         assert!(error.message().contains("ends in .csv or .mcap"), "{error}");
+    }
+
+    /// What no column says, the kind of a sensor, is in the answer, for the model that reads the file.
+    #[test]
+    fn the_kind_of_a_sensor_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let rows: String = (0..200)
+            .map(|k| format!("{},{},{}\n", 0.01 * f64::from(k), k % 7, 3 * k))
+            .collect();
+        let log = Log::from_bytes("log.csv", format!("t_s,u_V,w_rpm\n{rows}").as_bytes()).unwrap();
+        let plant = "[plant.dc_axis]\n";
+        let map = "[log.inputs]\nvoltage = \"u\"\n[log.measured.speed]\ncolumn = \"w\"\nsensor = \"interval_mean\"\n";
+        let before = Model::from_toml("m.toml", &format!("{plant}{map}")).unwrap();
+        let before = Session::new(before, log).unwrap();
+        let path = folder.path().join("si.csv");
+        let answer = before.convert(&path).unwrap();
+        let (_, table) = answer.summary.split_once("\n\n").unwrap();
+        let after = Model::from_toml("m.toml", &format!("{plant}{table}")).unwrap();
+        let after = Session::new(after, Log::read(&path).unwrap()).unwrap();
+        let sensor = |s: &Session| s.data().unwrap().model.measured[0].sensor.clone();
+        assert_eq!(sensor(&after), sensor(&before));
+        assert_eq!(sensor(&after).name(), "interval mean");
     }
 }
