@@ -3,7 +3,7 @@
 //! A test that simulates a model and then finds that very model proves little. The machines here
 //! are built from parts (masses, inertias, torques in N m, currents in windings of some
 //! inductance, dry friction that really sticks, gears with teeth, encoders with marks) and share
-//! neither equations nor integrator with the models that are held against them. Without an effect
+//! neither equations nor integrator with the models that are compared with them. Without an effect
 //! and without inductance those of motors and wheels obey the lumped equations of the paper exactly,
 //! by construction: [`Driven::parts`] says how. Every other shipped plant has a machine of its own
 //! ([`Robot`]), with one command; [`catalogue`] says what is hidden where.

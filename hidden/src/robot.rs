@@ -5,7 +5,7 @@ use crate::effect::Hidden;
 use crate::experiment::Experiment;
 use crate::machines::{self, Sheet};
 
-/// A machine that can hide an effect. Each has a plant of its own that it is held against.
+/// A machine that can hide an effect. Each has a plant of its own that it is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Robot {
     /// Differential-drive robot after the Twil: two geared DC motors, odometry. Plant: `ddmr`.
@@ -20,7 +20,7 @@ pub enum Robot {
     Arm,
     /// A slide on a ball screw under a position loop. Plant: `servo_axis`.
     ServoAxis,
-    /// A pole held upright on a cart. Plant: `cart_pole`.
+    /// A pole balanced on a cart. Plant: `cart_pole`.
     CartPole,
 }
 

@@ -1,4 +1,4 @@
-//! What was hidden, in words and numbers, so that a finding can be held against it.
+//! What was hidden, in words and numbers, so that a finding can be compared with it.
 
 use crate::{Hidden, Robot};
 

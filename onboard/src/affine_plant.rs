@@ -13,8 +13,8 @@ use crate::parts::{Parts, PerInput, PerParameter};
 /// | `w` | efforts of the effects, [`Efforts`] |
 /// | `x̄` | `y` moved towards where it is wanted, by a band at most: dry friction is taken in the direction of the motion that is to begin |
 ///
-/// It is to a robot what `Affine` is to a host, for effects that act at once as forces; delays, lags and what
-/// lies between a command and the plant are not made up for.
+/// It is the robot's counterpart of the host's `Affine`, for effects that act at once as forces. Delays, lags and
+/// what lies between a command and the plant are not compensated.
 ///
 /// Reference: H. Olsson, K. J. Åström, C. Canudas de Wit, M. Gäfvert, P. Lischinsky (1998), "Friction models
 /// and friction compensation", European Journal of Control 4, 176–195, section 5.

@@ -8,8 +8,8 @@ use nalgebra::{Const, SVector};
 
 /// An estimator that can be compiled into a firmware. [`aboard!`](crate::aboard) names it.
 ///
-/// There is one per controlled state. Each works on scaled parameters and under guard
-/// ([`Guarded`]): projection, dead zone and excitation are not its business.
+/// There is one per controlled state. Each works on scaled parameters, and [`Guarded`] does projection, dead zone
+/// and excitation for it.
 pub trait OnboardEstimator<S: Real>: Estimator<S> + Sized {
     /// How many parameters it estimates: those of one controlled state.
     const PARAMETERS: usize;

@@ -1,7 +1,7 @@
 //! The adaptive loop aboard a robot: plant, effects, learning and control law in fixed sizes, in `f32`, without
 //! `std` and without an allocator. And the conversation that configures, runs and stops it.
 //!
-//! It is the loop of a desk: [`loopsight_core::Loop`] with an estimator under
+//! It is the same loop as on a host: [`loopsight_core::Loop`] with an estimator under
 //! [`loopsight_core::learning::Guarded`] and a control law, over the same source of every plant and effect. A host
 //! probes a composed model at run time. Here a plant's [`loopsight_core::ControlAffine`] view does that work, so that
 //! it fits a microcontroller.

@@ -61,7 +61,7 @@ impl<S: Real, A: Array<S> + Copy + Send> Driver<S> for Port<S, A> {
     }
 }
 
-/// A clock that never waits: someone else says when a tick is.
+/// A clock that never waits: the board's timer starts each tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Prompted;
 

@@ -44,7 +44,7 @@ pub struct Sensors<A> {
 /// ([`Session::with_sensors`]) ticks by its own timer. Its board calls [`Session::sensed`] instead, and then
 /// hands [`Session::output`] to the motors. The host's steps bring the reference.
 ///
-/// However a run ends, the motors are let go and the robot says why. Only a new configuration lets it move
+/// At any end of a run the motors are released and the robot reports why. Only a new configuration lets it move
 /// again. A run ends ([`Reason`]) when
 ///
 /// * no valid step came for longer than the watchdog allows, whatever else came over the line;
@@ -178,7 +178,7 @@ impl<R: Parts<Scalar = f32>, M: Meter> Session<R, M> {
         }
     }
 
-    /// Lets the motors go, and says why.
+    /// Releases the motors, and reports why.
     fn rest(&mut self, reason: Reason, say: &mut dyn FnMut(&Reply)) {
         self.run = None;
         say(&Reply::Stopped {

@@ -1,4 +1,4 @@
-//! What a robot checks by itself, whether messages come or not.
+//! What a robot checks by itself, with or without messages.
 
 use heapless::Vec;
 use loopsight_core::{Array, Place, Plant, Role};

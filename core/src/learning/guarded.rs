@@ -75,8 +75,8 @@ impl Default for Guards {
 /// estimate still moves along a direction that is not; along one that is as good as absent
 /// (`√m_i < m₀/10`) it does not move at all, and the prediction is none the worse for it.
 ///
-/// **Projection** is in the metric of the covariance: what one parameter is held back by, the others
-/// that are correlated with it make up for. Taking each to its bound on its own would spoil a good
+/// **Projection** is in the metric of the covariance: the parameters that are
+/// correlated with a bounded one make up for what the bound takes from it. Taking each to its bound on its own would spoil a good
 /// prediction, and a proof of convergence with it. An estimator whose covariance is not finite has
 /// each parameter taken to its bound.
 ///

@@ -14,7 +14,7 @@ pub enum Withheld {
     Stale,
     /// An actuator was asked for more than it can give.
     Saturated,
-    /// The controller held its last command.
+    /// The controller repeated its last command.
     HeldCommand,
     /// A number that is not finite, or a regressor of another length.
     NotFinite,

@@ -1,4 +1,4 @@
-//! A pole held upright on a cart.
+//! A pole balanced on a cart.
 
 use std::f64::consts::TAU;
 
@@ -35,7 +35,7 @@ const CART_COUNT: f64 = 5e-5;
 /// Feedback of position, velocity, angle and rate, N/m, N s/m, N, N s.
 const FEEDBACK: [f64; 4] = [14.27, 12.98, 63.97, 12.58];
 
-/// A rod on a cart, held upright by state feedback of counted angles and their differences. The
+/// A rod on a cart, balanced by state feedback of counted angles and their differences. The
 /// command is a force that shakes the cart; what the motor of the rail is told is the sum of both.
 ///
 /// Positions and momenta, after Hamilton: with `D = [M, b cos θ; b cos θ, J]`

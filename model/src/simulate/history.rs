@@ -104,7 +104,7 @@ impl<S: HostReal> History<S> {
     }
 
     /// Integral and value at `time`, at an entry from the side before it: what a delay of zero is
-    /// differentiated to. Before the first and after the last entry the signal is held.
+    /// differentiated to. Before the first and after the last entry the signal is constant.
     fn at(&self, time: S) -> (S, S) {
         let n = self.entries.len();
         if n == 0 {

@@ -1,4 +1,4 @@
-//! A free run that is held to the measurements.
+//! A free run that an observer corrects by the measurements.
 
 use crate::registry::HostReal;
 

@@ -9,7 +9,7 @@ use super::history::History;
 
 impl<S: HostReal> Simulator<'_, S> {
     /// As [`Simulator::advance`], where the input at `until` is `next`: inputs with a first-order
-    /// hold run straight there, the others are held.
+    /// hold run straight there, the others stay constant.
     ///
     /// # Panics
     ///
@@ -45,7 +45,7 @@ pub(super) fn ramped<S: HostReal>(inputs: &mut [S], bounds: &Bounds, slopes: &[f
 }
 
 /// Remembers the inputs that effects with memory look back on as their means over the step from
-/// `from` on, and leaves these means in `held`: a ramp is held in steps there.
+/// `from` on, and leaves these means in `held`: a ramp becomes steps there.
 pub(super) fn hold_means<S: HostReal>(
     bounds: &Bounds,
     histories: &mut [History<S>],

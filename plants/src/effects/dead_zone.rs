@@ -3,7 +3,7 @@
 use crate::declare_effect;
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
-/// Dead zone: commands below a threshold do nothing, and others lose it.
+/// Dead zone: commands below a threshold do nothing, and larger ones are reduced by it.
 ///
 /// ```text
 /// u_effective = u - threshold · sign(u)    |u| > threshold
@@ -27,7 +27,7 @@ pub struct DeadZone;
 impl Effect for DeadZone {
     const META: EffectMeta = EffectMeta {
         id: "dead_zone",
-        summary: "commands below a threshold do nothing, and others lose it",
+        summary: "commands below a threshold do nothing, and larger ones are reduced by it",
         symptom: "small commands move the model but not the robot; larger ones are short by the same amount at every level, with the sign of the command",
         remedy: "add the threshold to the command, with its sign; a motor driver with a finer dead time or a higher PWM frequency",
         equation: "u_effective = u - threshold sign(u) where |u| > threshold, else 0",

@@ -3,7 +3,7 @@
 use crate::declare_effect;
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
-/// Gravity on an arm: a moment that goes round with the angle.
+/// Gravity on an arm: a moment that is a sine of the angle.
 ///
 /// ```text
 /// w = cosine · cos(angle) + sine · sin(angle)
@@ -30,7 +30,7 @@ pub struct GravityPendulum;
 impl Effect for GravityPendulum {
     const META: EffectMeta = EffectMeta {
         id: "gravity_pendulum",
-        summary: "gravity on an arm or an unbalanced wheel: goes round with the angle",
+        summary: "gravity on an arm or an unbalanced wheel: a sine of the angle",
         symptom: "the arm is slower going up than coming down and does not stay where it is left; the residual is a sine over the angle, once per turn",
         remedy: "feed the moment forward with the angle; balance the arm",
         equation: "w = cosine cos(angle) + sine sin(angle)",

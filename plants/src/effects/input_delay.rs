@@ -11,7 +11,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 ///
 /// | symbol | what | unit |
 /// |---|---|---|
-/// | `u` | the command, held between the samples of the log | that of the channel |
+/// | `u` | the command, constant between the samples of the log | that of the channel |
 /// | `delay` | time from the log to the actuator | s |
 ///
 /// Over an integration step the delayed command is replaced by its mean, which moves continuously

@@ -3,7 +3,7 @@
 use crate::declare_effect;
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
-/// Input offset: something is added to every command.
+/// Input offset: a constant is added to every command.
 ///
 /// ```text
 /// u_effective = u + offset
@@ -26,7 +26,7 @@ pub struct InputOffset;
 impl Effect for InputOffset {
     const META: EffectMeta = EffectMeta {
         id: "input_offset",
-        summary: "something is added to every command",
+        summary: "a constant is added to every command",
         symptom: "the residual drifts the same way whatever the command; the robot creeps at zero command",
         remedy: "subtract the offset from the command; trim the amplifier",
         equation: "u_effective = u + offset",

@@ -3,7 +3,7 @@
 use crate::declare_effect;
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role};
 
-/// Payload change: from an unknown time on the mass and the inertia are others.
+/// Payload change: mass and inertia change at an unknown time.
 ///
 /// ```text
 /// m(t) = m (1 + fraction · H(t))          H(t) = ½ (1 + tanh((t - time)/width))
@@ -35,7 +35,7 @@ pub struct PayloadChange;
 impl Effect for PayloadChange {
     const META: EffectMeta = EffectMeta {
         id: "payload_change",
-        summary: "from an unknown time on mass and inertia are others",
+        summary: "mass and inertia change at an unknown time",
         symptom: "the model is right up to a moment and wrong from then on: it accelerates too fast (or too slowly) while its final speeds stay right",
         remedy: "estimate while running, with forgetting; tell the controller when a load is taken up",
         equation: "rate = (nominal - max(fraction, 0) H'(t) v)/(1 + fraction H(t)), H(t) = (1 + tanh((t - time)/width))/2",

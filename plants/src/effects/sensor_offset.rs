@@ -3,7 +3,7 @@
 use crate::declare_effect;
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
-/// Sensor offset: the sensor reads something at zero.
+/// Sensor offset: a constant is added to what the sensor reads.
 ///
 /// ```text
 /// y_measured = y + offset
@@ -25,7 +25,7 @@ pub struct SensorOffset;
 impl Effect for SensorOffset {
     const META: EffectMeta = EffectMeta {
         id: "sensor_offset",
-        summary: "the sensor reads something at zero",
+        summary: "a constant is added to what the sensor reads",
         symptom: "the residual is the same constant at every speed, standing still included",
         remedy: "take the mean at rest and subtract it before each run",
         equation: "y_measured = y + offset",

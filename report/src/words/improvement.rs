@@ -169,7 +169,7 @@ pub fn text(improvement: &Improvement) -> String {
         .collect();
     let mut text = String::new();
     if !rows.is_empty() {
-        text = table(&["step", "error, fitted", "error, unseen"], &rows) + "\n";
+        text = table(&["step", "fit error", "validation error"], &rows) + "\n";
     }
     text.push_str(&summary(improvement).join("\n"));
     let last = improvement.diagnoses.last();
