@@ -135,6 +135,28 @@ fn broken_logs_are_refused_without_harm() {
     campaign(400);
 }
 
+/// A file of Arrow with any one bit turned: buffers of a wrong length made the keys of a dictionary panic.
+#[cfg(feature = "arrow")]
+#[test]
+fn any_bit_of_an_arrow_file_may_be_wrong() {
+    for whole in [
+        common::tables::arrow_file(false),
+        common::tables::arrow_stream(),
+    ] {
+        let mut refused = 0;
+        for bit in 0..8 * whole.len() {
+            let mut bytes = whole.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            refused += usize::from(attempt(bytes).is_err());
+        }
+        assert!(
+            refused > whole.len() / 8,
+            "{refused} of {}",
+            8 * whole.len()
+        );
+    }
+}
+
 #[test]
 #[ignore = "200 000 broken logs of each format: minutes, in release mode"]
 fn a_campaign_of_broken_logs() {

@@ -8,6 +8,7 @@
 
 mod column;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use arrow_buffer::Buffer;
@@ -92,6 +93,34 @@ fn metadata(data: &[u8]) -> Option<(&[u8], usize)> {
 
 /// Reads a file.
 pub(crate) fn read_file(input: Input, sink: &mut dyn Sink) -> Result<(), FormatError> {
+    guarded(input, sink, file)
+}
+
+/// Reads a stream.
+pub(crate) fn read_stream(input: Input, sink: &mut dyn Sink) -> Result<(), FormatError> {
+    guarded(input, sink, |input, sink| {
+        let about = About::new(&input);
+        stream(Buffer::from_vec(input.into_bytes()?), &about, sink)
+    })
+}
+
+/// The `arrow` crate takes the keys of a dictionary as they lie: a buffer whose length or place does not suit them ends in a
+/// panic (`buffer/immutable.rs`). It holds no state outside the decoder that is dropped here, so the panic is caught and
+/// becomes the error that it should have been.
+fn guarded(
+    input: Input,
+    sink: &mut dyn Sink,
+    read: impl FnOnce(Input, &mut dyn Sink) -> Result<(), FormatError>,
+) -> Result<(), FormatError> {
+    let about = About::new(&input);
+    let work = AssertUnwindSafe(|| read(input, sink));
+    let done = catch_unwind(work);
+    done.unwrap_or_else(
+        |_| Err(about.refused("a buffer contradicts its type, the file is damaged")),
+    )
+}
+
+fn file(input: Input, sink: &mut dyn Sink) -> Result<(), FormatError> {
     let about = About::new(&input);
     let data = Buffer::from_vec(input.into_bytes()?);
     // A file that was cut is a stream behind its first eight bytes.
@@ -141,12 +170,6 @@ fn footer(data: &Buffer) -> Option<&[u8]> {
     let tail: [u8; 10] = data.get(trailer..)?.try_into().ok()?;
     let length = read_footer_length(tail).ok()?;
     data.get(trailer.checked_sub(length)?..trailer)
-}
-
-/// Reads a stream.
-pub(crate) fn read_stream(input: Input, sink: &mut dyn Sink) -> Result<(), FormatError> {
-    let about = About::new(&input);
-    stream(Buffer::from_vec(input.into_bytes()?), &about, sink)
 }
 
 fn stream(mut data: Buffer, about: &About, sink: &mut dyn Sink) -> Result<(), FormatError> {

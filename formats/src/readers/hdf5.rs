@@ -195,7 +195,10 @@ impl Reader {
 
     fn bytes(&mut self, dataset: &Dataset) -> Result<Vec<u8>, Error> {
         let size = dataset.raw_byte_len()?;
-        match self.left.checked_sub(size) {
+        // An element of one byte becomes a number of eight.
+        let row = dataset.raw_element_size().unwrap_or(0).max(1);
+        let cost = size.max((size / row).saturating_mul(size_of::<f64>()));
+        match self.left.checked_sub(cost) {
             Some(left) => self.left = left,
             None => {
                 return Err(Error::Other(
