@@ -1,10 +1,11 @@
 //! What follows from the candidates: whether an effect is missing, and which.
 
 use crate::advice::advice;
+use crate::candidates::Candidate;
 use crate::choose::choose;
 use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::{Criteria, MissingCriteria};
-use crate::estimate::{Estimate, ParameterVerdict};
+use crate::estimate::strength_is_determined;
 use crate::judge::{Losses, advantage, nrmse};
 use crate::trial::{Judged, Nominal};
 
@@ -98,7 +99,7 @@ impl Evidence<'_> {
         let better = unseen > criteria.beats
             || (unseen > 0.0 && explanation.significance > criteria.certain)
             || self.shown_by_starts(judged, explanation);
-        better && determined(explanation, criteria.undetermined)
+        better && determined(&judged.candidate, explanation, criteria.undetermined)
     }
 
     /// Whether the starts of the runs show the effect. They are not validation data, because the initial state
@@ -152,16 +153,12 @@ fn explained(error: f64, left: f64) -> f64 {
     (error.powi(2) - left.powi(2)).max(0.0).sqrt()
 }
 
-/// Whether the log determines any parameter of the effect. An effect that cannot be told from the plant's own
+/// Whether the log determines how strong the effect is. An effect that cannot be told from the plant's own
 /// parameters counts as not found, even if a test recording agrees with it.
-fn determined(explanation: &Explanation, undetermined: f64) -> bool {
-    let says_nothing = |p: &Estimate| match p.verdict {
-        ParameterVerdict::Flat
-        | ParameterVerdict::Dead
-        | ParameterVerdict::Frozen
-        | ParameterVerdict::Unfinished => true,
-        ParameterVerdict::NotPinned => p.std_error.is_none_or(|e| e > undetermined * p.value.abs()),
-        ParameterVerdict::Good | ParameterVerdict::AtBound | ParameterVerdict::Tied => false,
-    };
-    !explanation.parameters.values().all(says_nothing)
+fn determined(candidate: &Candidate, explanation: &Explanation, undetermined: f64) -> bool {
+    let own = candidate.own().filter_map(|i| {
+        let estimate = explanation.parameters.get(&candidate.name(i))?;
+        Some((&candidate.model.parameters[i], estimate))
+    });
+    strength_is_determined(own, undetermined)
 }

@@ -1,5 +1,7 @@
 //! What a fit says of one parameter.
 
+use loopsight_core::Parameter;
+use loopsight_model::model::ModelParameter;
 use serde::Serialize;
 
 /// What a fit says of one parameter.
@@ -54,4 +56,36 @@ pub struct Estimate {
     pub interval95: Option<[f64; 2]>,
     /// What the data say of it.
     pub verdict: ParameterVerdict,
+}
+
+impl Estimate {
+    /// Whether the data say how large it is: its standard error is at most `undetermined` times its value.
+    pub(crate) fn is_determined(&self, undetermined: f64) -> bool {
+        match self.verdict {
+            ParameterVerdict::Flat
+            | ParameterVerdict::Dead
+            | ParameterVerdict::Frozen
+            | ParameterVerdict::Unfinished => false,
+            ParameterVerdict::NotPinned => {
+                (self.std_error).is_some_and(|e| e <= undetermined * self.value.abs())
+            }
+            ParameterVerdict::Good | ParameterVerdict::AtBound | ParameterVerdict::Tied => true,
+        }
+    }
+}
+
+/// Whether the data say how strong an effect is: its `parameters`, with their estimates. One that is zero without
+/// the effect must be determined, or any at all where there is none of that kind. When a payload changes is no
+/// evidence while nobody can tell by how much.
+pub(crate) fn strength_is_determined<'a>(
+    parameters: impl Iterator<Item = (&'a ModelParameter, &'a Estimate)> + Clone,
+    undetermined: f64,
+) -> bool {
+    let size = |p: &Parameter| p.default == Some(0.0) && !p.starts_in_durations;
+    let sizes = || (parameters.clone()).filter(|(p, _)| size(p.declaration));
+    let determined = |(_, estimate): (_, &Estimate)| estimate.is_determined(undetermined);
+    match sizes().next() {
+        Some(_) => sizes().any(determined),
+        None => parameters.clone().any(determined),
+    }
 }

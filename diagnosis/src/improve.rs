@@ -8,7 +8,7 @@ use crate::fitted::Fit;
 use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
 use crate::progress::{Cancelled, Work};
-use crate::refine::{refine, still_open};
+use crate::refine::{refine, still_open, without_undetermined};
 use crate::settings::{FitSettings, Method};
 use loopsight_model::model::Model;
 
@@ -128,6 +128,46 @@ impl State {
         Ok(())
     }
 
+    /// The present model fitted to all of the log. A last step goes while the log does not say how strong its effect
+    /// is and the unseen error hardly fell with it: there is some effect for every imperfection, and it would take
+    /// their values from the parameters that the log does determine.
+    fn settled(
+        &mut self,
+        measurements: &Measurements<'_>,
+        settings: &FitSettings,
+        work: &Work<'_>,
+    ) -> Result<Fit, FitError> {
+        let criteria = work.criteria();
+        let (better, undetermined) = (criteria.improve.better, criteria.missing.undetermined);
+        loop {
+            let fit = fit(&self.present, measurements, settings, work)?;
+            let [.., before, last] = &self.steps[..] else {
+                return Ok(fit);
+            };
+            if fit.cancelled || last.nrmse_test < better * before.nrmse_test {
+                return Ok(fit);
+            }
+            let Some(without) = without_undetermined(&fit, last, undetermined) else {
+                return Ok(fit);
+            };
+            self.present = without;
+            self.steps.pop();
+        }
+    }
+
+    /// The verdict on the steps that remain: that nothing is missing was said with all of them.
+    fn concluded(&self, verdict: Conclusion, work: &Work<'_>) -> Conclusion {
+        let above_floor = work.criteria().missing.above_floor;
+        match (verdict, self.steps.last(), self.diagnoses.last()) {
+            (Conclusion::NothingMissing, Some(last), Some(diagnosis))
+                if last.nrmse_test > above_floor * diagnosis.floor.nrmse =>
+            {
+                Conclusion::UnknownEffect
+            }
+            _ => verdict,
+        }
+    }
+
     /// Fits the best model to all of the log, and says what is still open; a cancelled one stays as it is.
     fn finish(
         mut self,
@@ -145,14 +185,14 @@ impl State {
                 (None, verdict)
             }
             Conclusion::Cancelled => (None, verdict),
-            _ => match fit(&self.present, measurements, &settings, &work.silently()) {
+            _ => match self.settled(measurements, &settings, &work.silently()) {
                 Err(FitError::Cancelled(Cancelled)) => (None, Conclusion::Cancelled),
                 Ok(fit) if fit.cancelled => (Some(fit), Conclusion::Cancelled),
                 Err(error) => return Err(error),
                 Ok(fit) => match self.tell_open(&fit.model, measurements, work) {
                     Err(FitError::Cancelled(Cancelled)) => (Some(fit), Conclusion::Cancelled),
                     Err(error) => return Err(error),
-                    Ok(()) => (Some(fit), verdict),
+                    Ok(()) => (Some(fit), self.concluded(verdict, work)),
                 },
             },
         };

@@ -7,6 +7,8 @@ use crate::candidates::{is_width, smooth};
 use crate::compare::compare;
 use crate::conclusion::{Diagnosis, EffectAt};
 use crate::error::FitError;
+use crate::estimate::strength_is_determined;
+use crate::fitted::Fit;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
 use crate::output_error;
@@ -59,6 +61,30 @@ fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<
             None => return Ok(()),
         }
     }
+}
+
+/// The fitted model without the effect of `step`, where the log does not say how strong that effect is; none
+/// where it does.
+pub(crate) fn without_undetermined(
+    fit: &Fit,
+    step: &ImprovementStep,
+    undetermined: f64,
+) -> Option<Model> {
+    let model = &fit.model;
+    let instances = instances(model, step.added.as_ref()?);
+    let of_effect = |i: &usize| {
+        let effect = &model.effects[*i];
+        let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+        model.parameters[own].iter()
+    };
+    let estimated = instances
+        .iter()
+        .flat_map(of_effect)
+        .filter_map(|p| Some((p, fit.parameters.get(&p.name)?)));
+    if instances.is_empty() || strength_is_determined(estimated, undetermined) {
+        return None;
+    }
+    without(model, &instances)
 }
 
 /// The model without some of its effects.

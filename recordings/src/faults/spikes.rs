@@ -15,6 +15,10 @@ const BETWEEN: f64 = 0.25;
 /// Share of the readings from which they are no accident, but how the sensor is.
 const ACCIDENTS: f64 = 0.05;
 
+/// Readings that may be absurd side by side: where one reading in a hundred is, two are next to each other in every
+/// log of some length; three in one of a million readings.
+const TOGETHER: usize = 2;
+
 /// Takes single absurd readings out of the measured signals: they count as missing, and one fault for each
 /// signal says how many.
 ///
@@ -25,6 +29,7 @@ const ACCIDENTS: f64 = 0.05;
 /// |d(k)| > 12 s   and   |y(k+1) - y(k-1)| < |d(k)|/4
 /// ```
 ///
+/// Two side by side are absurd where each is so far from the mean of those around them.
 /// (F. R. Hampel, 1974, "The influence curve and its role in robust estimation", for the scale.) With
 /// Gaussian noise one reading in 10³² is. A signal that changes by steps of its resolution has one such step
 /// as its usual size at least.
@@ -100,15 +105,24 @@ fn usual(runs: &[Run], s: usize) -> f64 {
     (median(&mut all) / 0.6745).max(0.5 * median(&mut steps))
 }
 
-/// Readings that stand alone.
+/// Readings that stand alone, or two together.
 fn alone(run: &Run, s: usize, size: f64) -> Vec<usize> {
-    (1..run.len().saturating_sub(1))
-        .filter(|k| {
-            let off = deviation(run, s, *k).abs();
-            let apart = (run.sample(k + 1)[s] - run.sample(k - 1)[s]).abs();
-            off > FAR * size && apart < BETWEEN * off
-        })
-        .collect()
+    let reading = |k: usize| run.sample(k)[s];
+    let mut found = Vec::new();
+    for together in 1..=TOGETHER {
+        for k in 1..run.len().saturating_sub(together) {
+            let group = k..k + together;
+            let (before, after) = (reading(k - 1), reading(group.end));
+            let off = |k: usize| (reading(k) - 0.5 * (before + after)).abs();
+            let least = group.clone().map(off).fold(f64::INFINITY, f64::min);
+            if least > FAR * size && (after - before).abs() < BETWEEN * least {
+                found.extend(group);
+            }
+        }
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
 }
 
 #[cfg(test)]
@@ -142,6 +156,23 @@ mod tests {
             found[0].detail.starts_with("8 of 800 readings"),
             "{}",
             found[0].detail
+        );
+    }
+
+    #[test]
+    fn two_absurd_readings_side_by_side_count_as_missing() {
+        let odd = |_: usize, mut row: [f64; 5]| {
+            match (row[0] * 100.0).round() as usize % 100 {
+                37 => row[3] = 40.0,
+                38 => row[3] = -25.0,
+                _ => {}
+            }
+            row
+        };
+        let found = spikes(odd);
+        assert!(
+            found[0].detail.starts_with("16 of 800 readings"),
+            "{found:?}"
         );
     }
 

@@ -7,7 +7,7 @@ use loopsight_hidden::{Experiment, Hidden, Recording, Robot, record_with, refit}
 use loopsight_model::model::Model;
 
 /// A refit of the plain model leaves less than this multiple of the floor: nothing shows.
-const INVISIBLE: f64 = 1.15;
+pub(crate) const INVISIBLE: f64 = 1.15;
 
 /// What follows the argument `name`, or a default.
 pub(crate) fn argument(name: &str, default: &str) -> String {

@@ -260,7 +260,7 @@ fn a_loop_around_an_unstable_robot_ends_with_a_message() {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(
-        said.contains("finite") && !said.contains("panicked"),
+        said.contains("diverged") && !said.contains("panicked"),
         "{said}"
     );
     assert!(desk.path("run.csv").exists());
