@@ -10,7 +10,7 @@ use crate::error::Result;
 
 #[cfg(feature = "cli")]
 pub(crate) use output::apart;
-pub(crate) use output::check;
+pub(crate) use output::{check, distinct};
 
 /// Writes a text, whole or not at all.
 pub(crate) fn save(path: &Path, text: &str) -> Result<Written> {

@@ -140,7 +140,9 @@ impl Session {
         if let Some(path) = &log_path {
             files::check(path)?;
         }
-        reads.apart(log_path.iter().chain(&options.pages).map(PathBuf::as_path))?;
+        let outputs = log_path.iter().chain(&options.pages);
+        reads.apart(outputs.clone().map(PathBuf::as_path))?;
+        files::distinct(outputs.map(PathBuf::as_path))?;
         // The timer of a robot that runs the law itself is not the host's to measure.
         let real_time = (file.real_time || !file.driver.is_simulated()) && !file.driver.runs_law();
         let mut recorder = Recorder::new(model, &composed, file.period_s, real_time);

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 
+use super::output;
 use crate::error::Error;
 
 /// Shows an error on standard error: in its text with a caret, where there is one.
@@ -20,7 +21,7 @@ pub(crate) fn print(error: &Error) {
         });
         format!("error: {}{help}", error.message())
     });
-    eprintln!("{}", text.trim_end());
+    output::note(text.trim_end());
 }
 
 /// The text with the place of the mistake, and a line before and behind it.

@@ -6,16 +6,17 @@ use super::output;
 use crate::error::{Error, Result};
 use crate::{Log, Model, Session, Written, files};
 
-/// Refuses outputs that cannot be written, or that this command reads, before its work.
+/// Refuses outputs that cannot be written, that this command reads, or that are one and the same, before its work.
 pub(crate) fn check<'p>(
     outputs: impl IntoIterator<Item = &'p PathBuf>,
     inputs: &[&[PathBuf]],
 ) -> Result<()> {
-    for path in outputs {
+    let outputs: Vec<&Path> = outputs.into_iter().map(PathBuf::as_path).collect();
+    for path in &outputs {
         files::check(path)?;
         apart(path, inputs)?;
     }
-    Ok(())
+    Ok(files::distinct(outputs)?)
 }
 
 /// Refuses an output that is one of the inputs.

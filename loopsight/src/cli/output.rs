@@ -6,9 +6,10 @@ use crate::answers::Answer;
 use crate::error::Result;
 pub(crate) use crate::words::report::columns;
 
-/// Something for the person at the terminal that is not the result: standard error.
+/// Something for the person at the terminal that is not the result: standard error. A closed pipe is not an error
+/// here either.
 pub(crate) fn note(text: &str) {
-    eprintln!("{text}");
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
 /// The result: standard output. A closed pipe is not an error.

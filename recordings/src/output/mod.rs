@@ -7,6 +7,7 @@
 mod error;
 mod folder;
 mod growing;
+mod temporary;
 
 use std::fmt;
 use std::fs::{Metadata, Permissions};
@@ -74,7 +75,7 @@ pub fn check(path: &Path) -> Result<(), OutputError> {
     OutputFile::create(path).map(drop)
 }
 
-/// Refuses an output that is one of the inputs, by whatever name.
+/// Refuses an output that is one of the inputs, by whatever name: another path, a link, or a hard link.
 ///
 /// # Errors
 ///
@@ -87,7 +88,7 @@ pub fn apart<'p>(
         return Ok(());
     };
     for input in inputs {
-        if input.canonicalize().is_ok_and(|input| input == place) {
+        if input.canonicalize().is_ok_and(|input| input == place) || one_file(input, output) {
             return Err(OutputError::Input {
                 path: output.to_owned(),
                 input: input.to_owned(),
@@ -97,7 +98,28 @@ pub fn apart<'p>(
     Ok(())
 }
 
-/// A file on its way: it has a temporary name in the folder of its own until [`OutputFile::finish`], and is gone if it is dropped before.
+/// Refuses one place for two outputs, by whatever names: the second would replace the first.
+///
+/// # Errors
+///
+/// [`OutputError::Place`].
+pub fn distinct<'p>(outputs: impl IntoIterator<Item = &'p Path>) -> Result<(), OutputError> {
+    let mut places = Vec::new();
+    for output in outputs {
+        let folder = folder_of(output)?;
+        let place = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        let place = place.join(output.file_name().unwrap_or_default());
+        if places.contains(&place) {
+            let why = "another output of this command goes to the same file; give them two names";
+            return Err(OutputError::place(output, why));
+        }
+        places.push(place);
+    }
+    Ok(())
+}
+
+/// A file on its way: it has a temporary name in the folder of its own until [`OutputFile::finish`], and is gone if it is dropped before. What
+/// a program that was killed left of it is removed by the next one that writes the same file.
 pub struct OutputFile {
     path: PathBuf,
     out: BufWriter<NamedTempFile>,
@@ -112,13 +134,7 @@ impl OutputFile {
     pub fn create(path: &Path) -> Result<Self, OutputError> {
         let there = replaceable(path)?;
         let folder = folder_of(path)?;
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".loopsight-").suffix(".tmp");
-        if let Some(permissions) = permissions(there.as_ref()) {
-            builder.permissions(permissions);
-        }
-        let file = builder
-            .tempfile_in(folder)
+        let file = temporary::create(path, folder, permissions(there.as_ref()))
             .map_err(|e| OutputError::place(path, e.to_string()))?;
         Ok(Self {
             path: path.to_owned(),
@@ -207,6 +223,19 @@ fn through_a_link(path: &Path) -> Option<PathBuf> {
     });
     let folder = linked.then(|| folder.canonicalize().ok()).flatten()?;
     Some(folder.join(path.file_name()?))
+}
+
+/// Whether two names, links followed, are of one file.
+#[cfg(unix)]
+fn one_file(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let number = |path: &Path| path.metadata().map(|m| (m.dev(), m.ino()));
+    matches!((number(a), number(b)), (Ok(a), Ok(b)) if a == b)
+}
+
+#[cfg(not(unix))]
+fn one_file(_: &Path, _: &Path) -> bool {
+    false
 }
 
 /// Those of the file that is replaced; without one as any other new file, not readable by its owner alone.

@@ -43,6 +43,22 @@ fn an_input_is_no_output() {
     );
     assert!(error.is_request());
     apart(&folder.path().join("other.csv"), [file.as_path()]).unwrap();
+    let hard = folder.path().join("hard.csv");
+    std::fs::hard_link(&file, &hard).unwrap();
+    if cfg!(unix) {
+        apart(&hard, [file.as_path()]).unwrap_err();
+    }
+}
+
+#[test]
+fn two_outputs_have_two_places() {
+    let folder = tempfile::tempdir().unwrap();
+    let one = folder.path().join("a.html");
+    let again = folder.path().join(".").join("a.html");
+    let error = distinct([one.as_path(), &again]).unwrap_err();
+    assert!(error.to_string().contains("another output"), "{error}");
+    assert!(error.is_request());
+    distinct([one.as_path(), &folder.path().join("b.html")]).unwrap();
 }
 
 #[test]

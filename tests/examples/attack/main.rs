@@ -13,6 +13,7 @@
 )]
 
 mod targets;
+mod twins;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -81,9 +82,18 @@ fn work(target: &Target, seed: u64, count: u64, clock: Instant, begun: &AtomicU6
         take(&whole)
     });
     assert!(2 * right.count() >= inputs.len(), "{}", target.name);
-    for round in 0..count {
-        let whole = &inputs[random.below(inputs.len())];
-        let bytes = (target.dress)(damaged(whole, &mut random), &mut random);
+    let corpus = target.corpus.map(targets::corpus).unwrap_or_default();
+    for round in 0..count.max(corpus.len() as u64) {
+        let bytes = match corpus.get(round as usize) {
+            // What is known to hurt comes first, as it is.
+            Some(bytes) => bytes.clone(),
+            None => {
+                let hurt = !corpus.is_empty() && random.below(4) == 0;
+                let from = if hurt { &corpus } else { &inputs };
+                let whole = &from[random.below(from.len())];
+                (target.dress)(damaged(whole, &mut random), &mut random)
+            }
+        };
         let limit = TIMES * bytes.len() as u64 + BESIDE;
         begun.store(clock.elapsed().as_millis() as u64 + 1, Ordering::Relaxed);
         let from = Instant::now();

@@ -1,5 +1,6 @@
 //! What is attacked: each with inputs that are right, and what takes them.
 
+use crate::twins;
 use loopsight::{CompareOptions, Experiment, Log, Session, SimulateOptions};
 use loopsight_link::{
     Attachment, Configuration, ControllerGains, Decoder, Hello, LONGEST, Learning, Measured, Note,
@@ -22,50 +23,77 @@ pub(crate) struct Target {
     /// Of all executions.
     pub(crate) share: f64,
     pub(crate) inputs: fn() -> Vec<Vec<u8>>,
+    /// Folder of `tests/corpus` whose files are damaged as well.
+    pub(crate) corpus: Option<&'static str>,
     /// What is put around what was damaged.
     pub(crate) dress: fn(Vec<u8>, &mut Random) -> Vec<u8>,
     pub(crate) take: fn() -> Take,
 }
 
 pub(crate) fn all() -> Vec<Target> {
-    let text = |name, share, inputs, take| Target {
+    let plain = |name, share, inputs, take| Target {
         name,
         share,
         inputs,
+        corpus: None,
         dress: |bytes, _| bytes,
         take,
+    };
+    let text = |name, share, inputs, corpus, take| Target {
+        corpus: Some(corpus),
+        ..plain(name, share, inputs, take)
     };
     vec![
         Target {
             name: "frames of the line",
             share: 0.70,
             inputs: messages,
+            corpus: None,
             dress: framed,
             take: decode,
         },
         Target {
             name: "a robot's session",
-            share: 0.275,
+            share: 0.263,
             inputs: messages,
+            corpus: None,
             dress: framed,
             take: session,
         },
-        text("model files", 0.006, models, model),
-        text("expressions", 0.010, expressions, model),
-        text("loop files", 0.004, loops, looped),
-        text("experiment files", 0.002, experiments, experiment),
-        text("CSV", 0.002, tables, log),
-        text("SysId JSON", 0.001, sysid, log),
+        text("model files", 0.006, models, "models", model),
+        text("expressions", 0.010, expressions, "models", model),
+        text("loop files", 0.004, loops, "loops", looped),
+        text(
+            "experiment files",
+            0.002,
+            experiments,
+            "experiments",
+            experiment,
+        ),
+        text("CSV", 0.002, tables, "csv", log),
+        text("SysId JSON", 0.001, sysid, "sysid", log),
+        plain(
+            "an expression beside Rust",
+            0.010,
+            twins::places,
+            twins::expression_and_rust,
+        ),
+        plain(
+            "single beside double precision",
+            0.002,
+            twins::drives,
+            twins::robot_and_desk,
+        ),
     ]
 }
 
-const SESSION: u32 = 0x5eed;
+pub(crate) const SESSION: u32 = 0x5eed;
 
-fn list<T: Clone, const N: usize>(values: &[T]) -> heapless::Vec<T, N> {
+pub(crate) fn list<T: Clone, const N: usize>(values: &[T]) -> heapless::Vec<T, N> {
     heapless::Vec::from_slice(values).unwrap()
 }
 
-fn configuration() -> Configuration {
+pub(crate) fn configuration() -> Configuration {
     let open = 1e3;
     Configuration {
         plant: "ddmr".try_into().unwrap(),
@@ -145,6 +173,14 @@ fn message<T: Serialize>(message: &T) -> Vec<u8> {
 
 /// Bytes of the sum behind a message.
 const SUM: usize = 4;
+
+/// The files of a folder of `tests/corpus`, in the order of their names.
+pub(crate) fn corpus(folder: &str) -> Vec<Vec<u8>> {
+    let entries = std::fs::read_dir(repository().join("tests/corpus").join(folder)).unwrap();
+    let mut paths: Vec<_> = entries.map(|e| e.unwrap().path()).collect();
+    paths.sort();
+    paths.iter().map(|p| std::fs::read(p).unwrap()).collect()
+}
 
 fn messages() -> Vec<Vec<u8>> {
     let configure = Request::Configure {

@@ -84,6 +84,13 @@ fn last_time(desk: &Desk, name: &str) -> Option<f64> {
     text.lines().last()?.split(',').next()?.parse().ok()
 }
 
+/// Temporary files that nobody removed.
+fn left(desk: &Desk) -> usize {
+    let entries = std::fs::read_dir(desk.folder.path()).unwrap();
+    let names = entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned());
+    names.filter(|n| n.starts_with(".loopsight-")).count()
+}
+
 /// Removes what killed runs left of their logs, so that each has a `.part` of its own.
 fn tidy(desk: &Desk) {
     for entry in std::fs::read_dir(desk.folder.path()).unwrap() {
@@ -99,7 +106,7 @@ pub(crate) fn killed(program: &Path, count: usize) -> Vec<Row> {
     let desk = Desk::new(program);
     let mut random = Random::new(18);
     let (mut half, mut refused, mut finished, mut lost) = (Vec::new(), 0, 0, 0.0f64);
-    let mut logs = 0;
+    let (mut logs, mut temporary, mut stayed) = (0, 0, 0);
     for (at, (arguments, files)) in COMMANDS.iter().enumerate() {
         let from = Instant::now();
         refused += usize::from(!desk.command(arguments).status().unwrap().success());
@@ -120,6 +127,7 @@ pub(crate) fn killed(program: &Path, count: usize) -> Vec<Row> {
             let ran = from.elapsed();
             child.kill().unwrap();
             let status = child.wait().unwrap();
+            temporary = temporary.max(left(&desk));
             finished += usize::from(!alive);
             refused += usize::from(!alive && !status.success());
             for file in *files {
@@ -138,6 +146,7 @@ pub(crate) fn killed(program: &Path, count: usize) -> Vec<Row> {
         }
         tidy(&desk);
         refused += usize::from(!desk.command(arguments).status().unwrap().success());
+        stayed += left(&desk);
     }
     let mut shown = format!(
         "{} half files; {refused} runs that did not start or failed; {finished} had finished before",
@@ -161,8 +170,16 @@ pub(crate) fn killed(program: &Path, count: usize) -> Vec<Row> {
             happened: format!(
                 "at most {lost:.2} s of the log lost, the start of the program included"
             ),
-            promised: "the log without its last second, and what a program takes to start",
+            promised: "less than a second, and what a program takes to start",
             kept: lost < 1.2,
+        },
+        Row {
+            what: "their temporary files".to_owned(),
+            happened: format!(
+                "at most {temporary} lay there at once, {stayed} after the next run of the same command"
+            ),
+            promised: "the next command that writes the same file removes them",
+            kept: stayed == 0,
         },
     ]
 }

@@ -12,6 +12,7 @@
     reason = "what is set up here is right, and a panic is how this program fails"
 )]
 
+mod clock;
 mod killed;
 mod robots;
 mod soak;
@@ -107,7 +108,9 @@ fn main() -> ExitCode {
     };
     say(killed::killed(&program, number(1, 20)));
     say(killed::full(&program));
+    say(clock::stepped(&program));
     say(robots::sensors());
+    say(robots::instants());
     say(robots::hidden());
     say(robots::blocks(&program));
     say(soak::unexcited(number(2, 1) * 1_000_000));

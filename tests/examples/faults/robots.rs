@@ -3,11 +3,12 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use loopsight_core::{Driver, Sample};
+use loopsight_core::{Driver, Sample, TickError};
 use loopsight_hidden::{Hidden, Live, Robot};
 use loopsight_model::loop_file::Composed;
 use loopsight_model::model::Model;
 use loopsight_model::registry::HostDriverError;
+use loopsight_model::supervisor::{described, turning};
 use loopsight_tests::loops::composed;
 use loopsight_tests::{PERIOD, twil, twil_path};
 
@@ -65,6 +66,19 @@ struct Outcome {
     farthest: f64,
 }
 
+/// Why a loop ended, as the command says it.
+fn words(error: &TickError<HostDriverError>, model: &Model) -> String {
+    let event = match error {
+        TickError::Supervisor(event) => event,
+        TickError::Driver(error) => return error.to_string(),
+        TickError::Control(error) => return error.to_string(),
+    };
+    let signals = model.measured.iter().map(|m| (m.signal.id, m.signal.unit));
+    let said = described(event, &signals.collect::<Vec<_>>(), &turning(model));
+    let why = said.strip_prefix("stopped by the supervisor: ");
+    why.unwrap_or(&said).to_owned()
+}
+
 fn drive(model: &Model, mut composed: Composed, seconds: f64) -> Outcome {
     let start = model.values();
     let mut outcome = Outcome {
@@ -84,7 +98,7 @@ fn drive(model: &Model, mut composed: Composed, seconds: f64) -> Outcome {
                     .fold(outcome.largest, most);
             }
             Err(error) => {
-                outcome.stopped = Some((time, format!("{error:?}")));
+                outcome.stopped = Some((time, words(&error, model)));
                 break;
             }
         }
@@ -106,13 +120,7 @@ impl Outcome {
     fn words(&self) -> String {
         let end = match &self.stopped {
             None => "ran to its end".to_owned(),
-            Some((time, why)) => {
-                let cause = why
-                    .split("cause: ")
-                    .nth(1)
-                    .and_then(|w| w.split(',').next());
-                format!("stopped after {time:.2} s: {}", cause.unwrap_or(why))
-            }
+            Some((time, why)) => format!("stopped after {time:.2} s: {why}"),
         };
         format!(
             "{end}; at most {:.1} V, {:.2} scales from the start",
@@ -179,6 +187,51 @@ pub(crate) fn sensors() -> Vec<Row> {
     });
     rows.collect()
 }
+
+/// How long it takes until two faults are found, by the instant at which they begin.
+pub(crate) fn instants() -> Vec<Row> {
+    let model = twil();
+    let robot = std::fs::read_to_string(twil_path()).unwrap();
+    let rows = [
+        (
+            "an encoder that counts nothing",
+            "dead_encoder = { of = \"shaft_angle_right\",",
+        ),
+        (
+            "a measured velocity that keeps its value",
+            "frozen = { signal = \"linear_velocity\",",
+        ),
+    ]
+    .map(|(what, fault)| {
+        let mut found: Vec<f64> = (0..INSTANTS)
+            .filter_map(|k| {
+                let start = 10.0 + 0.1 * f64::from(k);
+                let driver = format!("fault = [{{ {fault} start_s = {start} }} }}]\n");
+                let composed = composed(&text(&driver), &model, &robot).unwrap();
+                let (time, _) = drive(&model, composed, 30.0).stopped?;
+                Some(time - start)
+            })
+            .collect();
+        found.sort_by(f64::total_cmp);
+        let at = |share: f64| found[(share * (found.len().max(1) - 1) as f64) as usize];
+        Row {
+            what: format!("{what}, from {INSTANTS} instants between 10 and 20 s on"),
+            happened: format!(
+                "{} stopped; after {:.2} s (median), {:.2} s (9 of 10), {:.2} s (the last)",
+                found.len(),
+                at(0.5),
+                at(0.9),
+                at(1.0)
+            ),
+            promised: "the loop stops",
+            kept: found.len() == INSTANTS as usize && found[0] > 0.0,
+        }
+    });
+    rows.into()
+}
+
+/// Instants at which a fault begins.
+const INSTANTS: u8 = 100;
 
 /// Every effect that a Twil can hide, in thirty seconds each.
 pub(crate) fn hidden() -> Vec<Row> {

@@ -161,3 +161,53 @@ fn every_output_says_what_it_replaces() {
         std::fs::remove_file(desk.path("elsewhere/it.csv")).unwrap();
     }
 }
+
+/// The second would replace the first, whatever it is called.
+#[test]
+fn two_outputs_of_one_name_are_refused() {
+    let desk = Desk::new();
+    for arguments in [
+        &["fit", "model.toml", "log.csv", "-o", "it", "--html", "./it"][..],
+        &["run", "loop.toml", "-o", "it", "--html", "it"],
+        &["run", "loop.toml", "--html", "folder/../run.csv"],
+    ] {
+        desk.refused_saying(arguments, &["another output of this command"]);
+    }
+    for name in ["it", "run.csv", "run.csv.part"] {
+        assert!(!desk.path(name).exists(), "{name}");
+    }
+}
+
+/// A hard link is the file itself by another name.
+#[cfg(unix)]
+#[test]
+fn a_hard_link_of_an_input_is_an_input() {
+    let desk = Desk::new();
+    std::fs::hard_link(desk.path("log.csv"), desk.path("hard.csv")).unwrap();
+    let arguments = ["convert", "model.toml", "log.csv", "-o", "hard.csv"];
+    desk.refused_saying(&arguments, &["hard.csv", "which this command reads"]);
+}
+
+/// Nobody reads what is said any more, as behind `2>&1 | head`: the work is done all the same, and no panic follows.
+#[cfg(unix)]
+#[test]
+fn who_does_not_listen_any_more_costs_nothing() {
+    let desk = Desk::new();
+    for (arguments, status) in [
+        ("convert model.toml log.csv -o si.csv", 0),
+        ("convert model.toml nowhere -o no.csv", 2),
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut command = std::process::Command::new(super::PROGRAM);
+        let ended = command
+            .current_dir(desk.0.path())
+            .args(arguments.split(' '))
+            .stdout(writer.try_clone().unwrap())
+            .stderr(writer)
+            .status()
+            .unwrap();
+        assert_eq!(ended.code(), Some(status), "{arguments}");
+    }
+    assert!(desk.path("si.csv").exists());
+}
