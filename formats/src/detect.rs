@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::foreign::{NOT_READ, by_text};
+
 /// A format of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Format {
@@ -71,78 +73,17 @@ pub enum Content {
     Gzip,
     /// Packed by zstd.
     Zstd,
+    /// Text of two bytes a letter (UTF-16), the low byte first or last.
+    Utf16 {
+        /// The low byte is the first.
+        little: bool,
+    },
     /// Known and not read: what it is, and what helps.
     NotRead(&'static str, &'static str),
 }
 
 /// Bytes that [`detect`] looks at.
 pub const HEAD: usize = 1024;
-
-/// Magic numbers of what is not read: place, bytes, what it is, what helps.
-type Known = (usize, &'static [u8], &'static str, &'static str);
-
-const NOT_READ: [Known; 15] = [
-    (257, b"ustar", "a tar archive", "unpack it with `tar xf`"),
-    (
-        0,
-        b"#ROSBAG V2.0",
-        "a ROS 1 bag",
-        "convert it with `rosbags-convert --src FILE --dst FOLDER`, or to MCAP with `mcap convert`",
-    ),
-    (
-        0,
-        b"#ROSBAG V1",
-        "a ROS 1 bag of version 1",
-        "migrate it with `rosbag fix`, then convert it to MCAP with `mcap convert`",
-    ),
-    (
-        0,
-        b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",
-        "an old Office document (XLS)",
-        "save it as CSV",
-    ),
-    (
-        0,
-        b"TDSm",
-        "a National Instruments TDMS file",
-        "convert it to HDF5 or CSV with nptdms (`tdmsinfo`, `TdmsFile.as_hdf`)",
-    ),
-    (
-        0,
-        b"\xa3\x95\x80\x80",
-        "an ArduPilot DataFlash log (.bin)",
-        "convert it with pymavlink: `mavlogdump.py --format csv --types ATT,RCOU FILE`",
-    ),
-    (
-        0,
-        b"LOGG",
-        "a Vector BLF log",
-        "convert it with asammdf or python-can, and decode the signals with the DBC file",
-    ),
-    (
-        0,
-        b"MDF     ",
-        "an ASAM MDF file",
-        "convert it with asammdf: `mdf.export('csv')` or `mdf.export('mat')`",
-    ),
-    (
-        0,
-        b"FEA1",
-        "a Feather file of version 1",
-        "write it anew as Feather 2: `pyarrow.feather.write_feather(table, FILE)`",
-    ),
-    (
-        0,
-        b"ORC",
-        "an ORC table",
-        "write it as Parquet: `pyarrow.parquet.write_table(pyarrow.orc.read_table(FILE), OUT)`",
-    ),
-    (0, b"Obj\x01", "an Avro file", "write it as CSV or Parquet"),
-    (0, b"%PDF", "a PDF document", "the log itself is needed"),
-    (0, b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it"),
-    (0, b"BZh", "packed by bzip2", "unpack it with `bunzip2`"),
-    (0, b"\xfd7zXZ\x00", "packed by xz", "unpack it with `unxz`"),
-];
 
 /// Formats that are read, by magic number.
 const READ: [(&[u8], Format); 9] = [
@@ -167,6 +108,11 @@ pub fn detect(head: &[u8]) -> Content {
     if starts(b"\x28\xb5\x2f\xfd") {
         return Content::Zstd;
     }
+    match head {
+        [0xff, 0xfe, ..] => return Content::Utf16 { little: true },
+        [0xfe, 0xff, ..] => return Content::Utf16 { little: false },
+        _ => {}
+    }
     if starts(b"PK\x03\x04") || starts(b"PK\x05\x06") {
         return Content::Zip;
     }
@@ -184,6 +130,9 @@ pub fn detect(head: &[u8]) -> Content {
     }
     if is_mat5(head) {
         return Content::Log(Format::Mat5);
+    }
+    if let Some((what, remedy)) = by_text(head) {
+        return Content::NotRead(what, remedy);
     }
     Content::Log(Format::Text)
 }

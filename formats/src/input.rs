@@ -8,6 +8,7 @@ use ruzstd::decoding::StreamingDecoder;
 
 use crate::detect::{Content, Format, HEAD, detect};
 use crate::error::FormatError;
+use crate::foreign::by_name;
 
 /// How many times its own size a packed file may unfold to.
 pub const UNPACK_FACTOR: u64 = 64;
@@ -107,7 +108,13 @@ impl Input {
                     log: input.name.into(),
                 });
             }
-            match detect(&head) {
+            let mut content = detect(&head);
+            if content == Content::Log(Format::Text)
+                && let Some((what, remedy)) = by_name(&input.name, &head)
+            {
+                content = Content::NotRead(what, remedy);
+            }
+            match content {
                 Content::Log(format) => input.format = format,
                 Content::Zip => input.format = input.zip()?,
                 Content::NotRead(what, remedy) => {
@@ -118,7 +125,7 @@ impl Input {
                     });
                 }
                 wrapper => {
-                    input = input.unpack(wrapper == Content::Gzip)?;
+                    input = input.unpack(wrapper)?;
                     continue;
                 }
             }
@@ -127,10 +134,11 @@ impl Input {
         }
     }
 
-    fn unpack(mut self, gzip: bool) -> Result<Self, FormatError> {
-        let (what, format) = match gzip {
-            true => ("gzip", "packed by gzip"),
-            false => ("zstd", "packed by zstd"),
+    fn unpack(mut self, wrapper: Content) -> Result<Self, FormatError> {
+        let (what, format) = match wrapper {
+            Content::Gzip => ("gzip", "packed by gzip"),
+            Content::Zstd => ("zstd", "packed by zstd"),
+            _ => ("UTF-16", "text as UTF-16"),
         };
         if self.packed.len() >= NESTED {
             return Err(FormatError::NotRead {
@@ -149,11 +157,12 @@ impl Input {
         };
         let mut bytes = Vec::new();
         let source = BufReader::new(&mut self);
-        let read = match gzip {
-            true => flate2::read::MultiGzDecoder::new(source)
+        let read = match wrapper {
+            Content::Gzip => flate2::read::MultiGzDecoder::new(source)
                 .take(limit + 1)
                 .read_to_end(&mut bytes),
-            false => unpack_zstd(source, limit + 1, &mut bytes),
+            Content::Zstd => unpack_zstd(source, limit + 1, &mut bytes),
+            _ => unpack_utf16(source, limit, &mut bytes),
         };
         // What was unpacked before the cut is there; the reader finds that it ends too early.
         match read {
@@ -202,7 +211,10 @@ impl Input {
                 "save the logged signals in a MAT file",
             ));
         }
-        Err(not_read("a zip archive", "unpack it"))
+        let first = names
+            .first()
+            .map_or(String::new(), |n| format!(": `{n}` is in it"));
+        Err(not_read("a zip archive", &format!("unpack it{first}")))
     }
 
     /// File name, or what else errors call it.
@@ -323,6 +335,24 @@ pub(crate) fn unpack_zstd(
         }
     }
     Ok(bytes.len() - before)
+}
+
+/// As UTF-8, without the mark of the order of bytes; what is no letter becomes U+FFFD.
+fn unpack_utf16(source: impl Read, limit: u64, bytes: &mut Vec<u8>) -> io::Result<usize> {
+    let mut raw = Vec::new();
+    source.take(limit).read_to_end(&mut raw)?;
+    let unit = match raw.first() {
+        Some(0xff) => u16::from_le_bytes,
+        _ => u16::from_be_bytes,
+    };
+    let units = raw
+        .chunks_exact(2)
+        .skip(1)
+        .filter_map(|pair| Some(unit(pair.try_into().ok()?)));
+    let letters = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
+    let text: String = letters.collect();
+    bytes.extend(text.as_bytes());
+    Ok(text.len())
 }
 
 pub(crate) fn too_large(log: &str, what: &str, limit: u64) -> FormatError {

@@ -32,8 +32,11 @@ mod bytes;
 mod columns;
 mod detect;
 mod error;
+mod foreign;
 mod input;
 mod log;
+#[cfg(feature = "parquet")]
+mod parquet_write;
 mod readers;
 mod ros;
 mod sink;
@@ -43,6 +46,8 @@ pub use detect::{Content, Format, HEAD, detect};
 pub use error::FormatError;
 pub use input::{Input, PIPE_MOST, UNPACK_FACTOR, UNPACK_LEAST};
 pub use log::{Channel, Clock, Cut, Log, LogBuilder, MEMORY_FACTOR, MEMORY_LEAST, Texts, Values};
+#[cfg(feature = "parquet")]
+pub use parquet_write::{OutColumn, write_parquet};
 pub use readers::read_into;
 pub use sink::{ARRAY_MOST, ChannelInfo, Kind, Sink};
 

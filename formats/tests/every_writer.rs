@@ -17,7 +17,7 @@
 
 use std::path::{Path, PathBuf};
 
-use loopsight_formats::{Format, Input, Log, read};
+use loopsight_formats::{Format, Input, Log, OutColumn, read, write_parquet};
 
 /// Columns by name.
 fn recording(folder: &Path) -> Vec<(String, Vec<f64>)> {
@@ -91,4 +91,31 @@ fn every_writer_gives_the_same_numbers() {
         println!("{}: the same", file.display());
     }
     assert!(formats >= 25, "{formats} files");
+}
+
+/// The recording as Parquet beside its folder, for `tests/formats/read_back.py`.
+#[test]
+#[ignore = "needs the files of tests/formats/write_all.py: LOOPSIGHT_RECORDINGS=FOLDER"]
+fn a_table_for_other_programs() {
+    let folder = std::env::var_os("LOOPSIGHT_RECORDINGS").expect("LOOPSIGHT_RECORDINGS");
+    let columns = recording(Path::new(&folder));
+    let unit = |name: &str| {
+        ["rad_per_s", "m_per_s", "rad", "m", "V", "s"]
+            .into_iter()
+            .find(|unit| name.ends_with(&format!("_{unit}")))
+            .map(|unit| unit.replace("_per_", "/"))
+    };
+    let out: Vec<OutColumn> = columns
+        .iter()
+        .map(|(name, _)| OutColumn {
+            name: name.clone(),
+            unit: unit(name),
+        })
+        .collect();
+    let rows = 0..columns[0].1.len();
+    let rows: Vec<f64> = rows
+        .flat_map(|k| columns.iter().map(move |c| c.1[k]))
+        .collect();
+    let file = Path::new(&folder).with_file_name("written.parquet");
+    write_parquet(std::fs::File::create(file).unwrap(), &out, &rows).unwrap();
 }

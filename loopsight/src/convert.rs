@@ -5,7 +5,7 @@ use std::path::Path;
 use loopsight_model::log_map::{LogMap, Measured};
 use loopsight_model::model::{MeasuredSignal, Model as Composed};
 use loopsight_model::sensor::Sensor;
-use loopsight_recordings::{LogWriter, header, write_csv};
+use loopsight_recordings::{LogWriter, header, write_csv, write_parquet};
 
 use crate::answers::{Answer, ConvertAnswer};
 use crate::error::{Error, Result};
@@ -15,11 +15,20 @@ use crate::{files, words};
 /// Between runs that are laid end to end, s.
 const PAUSE: f64 = 1.0;
 
+/// What the ending of a name asks for.
+#[derive(Clone, Copy, PartialEq)]
+enum Out {
+    Csv,
+    Mcap,
+    Parquet,
+}
+
 impl Session {
-    /// Writes the signals that the model has in the log, in SI units: CSV, or MCAP where the name ends in
-    /// `.mcap`. Several runs have a column `run` with their numbers. In CSV the time of each begins at 0; in MCAP,
-    /// which players show on one line of time, they stand one after the other, 1 s apart. What was not measured at
-    /// a time stamp is left empty.
+    /// Writes the signals that the model has in the log, in SI units: CSV, or MCAP or Parquet where the name ends in
+    /// `.mcap` or `.parquet`. Several runs have a column `run` with their numbers. The time of each begins at 0, but in
+    /// MCAP, which players show on one line of time, they stand one after the other, 1 s apart. What was not measured at
+    /// a time stamp is left empty. Parquet has the units in the metadata of its fields, and needs the feature
+    /// `all-formats`.
     ///
     /// # Errors
     ///
@@ -28,12 +37,13 @@ impl Session {
         let path = path.as_ref();
         let data = self.data()?;
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let mcap = match ending.as_deref() {
-            Some("mcap") => true,
-            Some("csv") => false,
+        let out = match ending.as_deref() {
+            Some("mcap") => Out::Mcap,
+            Some("csv") => Out::Csv,
+            Some("parquet") => Out::Parquet,
             _ => {
                 return Err(Error::request(format!(
-                    "cannot write `{}`: expected a name that ends in .csv or .mcap",
+                    "cannot write `{}`: expected a name that ends in .csv, .mcap or .parquet",
                     path.display()
                 )));
             }
@@ -48,21 +58,31 @@ impl Session {
         let mut begin = 0.0;
         for (number, run) in (1_u32..).zip(data.runs.iter()) {
             for k in 0..run.len() {
-                rows.push(run.time()[k] + if mcap { begin } else { 0.0 });
+                rows.push(run.time()[k] + if out == Out::Mcap { begin } else { 0.0 });
                 rows.extend(several.then(|| f64::from(number)));
                 rows.extend(run.input(k).iter().chain(run.sample(k)));
             }
             begin += run.duration() + PAUSE;
         }
         let wrong = |error| Error::in_log(&error, &path.display().to_string(), None);
-        let written = if mcap {
-            let mut log = LogWriter::create(path, &columns).map_err(wrong)?;
-            for row in rows.chunks_exact(columns.len()) {
-                log.write(row).map_err(wrong)?;
+        let written = match out {
+            Out::Mcap => {
+                let mut log = LogWriter::create(path, &columns).map_err(wrong)?;
+                for row in rows.chunks_exact(columns.len()) {
+                    log.write(row).map_err(wrong)?;
+                }
+                log.finish()
             }
-            log.finish()
-        } else {
-            write_csv(path, &columns, &rows)
+            Out::Csv => write_csv(path, &columns, &rows),
+            Out::Parquet => {
+                let inputs = data.model.plant.inputs.iter();
+                let signals = inputs.chain(data.model.measured.iter().map(|m| m.signal));
+                let mut units = vec![Some("s".to_owned())];
+                units.extend(several.then_some(None));
+                units.extend(signals.map(|s| Some(s.unit.to_owned()).filter(|u| u != "1")));
+                let columns: Vec<_> = columns.iter().cloned().zip(units).collect();
+                write_parquet(path, &columns, &rows)
+            }
         };
         let written = written.map_err(wrong)?;
         let samples = rows.len() / columns.len();
@@ -129,9 +149,19 @@ mod tests {
         let model = |text: String| Model::from_toml("m.toml", &text).unwrap();
         let log = Log::from_bytes("log.csv", text.as_bytes()).unwrap();
         let before = Session::new(model(format!("{plant}{map}")), log).unwrap();
-        for name in ["si.csv", "si.mcap"] {
+        for name in ["si.csv", "si.mcap", "si.parquet"] {
             let path = folder.path().join(name);
-            let answer = before.convert(&path).unwrap();
+            let answer = before.convert(&path);
+            if name.ends_with("parquet") && !cfg!(feature = "all-formats") {
+                let error = answer.unwrap_err();
+                assert!(
+                    error.message().contains("the feature `all-formats`"),
+                    "{error}"
+                );
+                assert!(error.help().unwrap().contains("cargo install"), "{error}");
+                continue;
+            }
+            let answer = answer.unwrap();
             assert_eq!(
                 answer.columns,
                 ["time_s", "run", "voltage_V", "speed_rad_per_s"]
@@ -149,7 +179,10 @@ mod tests {
             }
         }
         let error = before.convert(folder.path().join("si.xls")).unwrap_err();
-        assert!(error.message().contains("ends in .csv or .mcap"), "{error}");
+        assert!(
+            error.message().contains("ends in .csv, .mcap or .parquet"),
+            "{error}"
+        );
     }
 
     /// What no column says, the kind of a sensor, is in the answer, for the model that reads the file.

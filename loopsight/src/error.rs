@@ -140,6 +140,9 @@ impl Error {
             Self::request(error.to_string())
         };
         this.0.file = Some(file.to_owned());
+        if error.needs_all_formats() {
+            this.0.help = Some(ALL_FORMATS.to_owned());
+        }
         let Some((line, field)) = place(error) else {
             return this;
         };
@@ -153,6 +156,10 @@ impl Error {
         this
     }
 }
+
+/// How to get a program that reads and writes every format.
+const ALL_FORMATS: &str =
+    "the command with every format: `cargo install --path loopsight --features all-formats`";
 
 /// Line and field (both from 1) of an error in a log.
 fn place(error: &RecordingError) -> Option<(usize, Option<usize>)> {

@@ -181,6 +181,9 @@ fn legible(value: f64, std_error: Option<f64>) -> f64 {
 }
 
 #[cfg(test)]
+mod clocks;
+
+#[cfg(test)]
 mod tests {
     use super::*;
 

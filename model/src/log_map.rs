@@ -1,13 +1,18 @@
 //! How the columns of a log map on the signals of a model.
 
+mod labels;
 mod ranges;
 
 use std::collections::BTreeMap;
 
+pub use labels::Labels;
 pub use ranges::Ranges;
 use serde::{Deserialize, Serialize};
 
 use crate::sensor::Sensor;
+
+/// Where the label of an experiment stands in the name of a column.
+const PLACE: &str = "{}";
 
 /// How the columns of a log map on the signals of a model: the table `[log]` of a model file.
 ///
@@ -32,6 +37,9 @@ pub struct LogMap {
     /// Column of a run number or name; rows with another value start a new run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run: Option<String>,
+    /// Experiments in columns side by side: what stands for `{}` in the names of columns, once for each run.
+    #[serde(default, skip_serializing_if = "Labels::is_empty")]
+    pub side_by_side: Labels,
     /// The inputs were measured at the machine, and are no commands: what a driver and a supply make of a command
     /// is in them, and the effects that stand for it ([`EffectMeta::before_input`](loopsight_core::EffectMeta))
     /// are no candidates.
@@ -53,6 +61,41 @@ impl LogMap {
             log: &'m LogMap,
         }
         toml::to_string(&File { log: self }).ok()
+    }
+
+    /// The map of each experiment that stands beside others, with its label; none where there is one.
+    pub fn experiments(&self) -> Vec<(&str, LogMap)> {
+        let labels = self.side_by_side.names().iter();
+        labels
+            .map(|label| (label.as_str(), self.experiment(label)))
+            .collect()
+    }
+
+    /// Whether a column is named by the label of its experiment.
+    pub fn names_experiments(&self) -> bool {
+        let columns = self
+            .time
+            .iter()
+            .chain(self.inputs.values())
+            .map(ColumnMap::name);
+        let measured = self.measured.values().filter_map(|m| m.column.as_deref());
+        let mut all = columns.chain(measured).chain(self.run.as_deref());
+        all.any(|name| name.contains(PLACE))
+    }
+
+    fn experiment(&self, label: &str) -> LogMap {
+        let mut map = self.clone();
+        map.side_by_side = Labels::default();
+        let put = |name: &mut String| *name = name.replace(PLACE, label);
+        for column in map.time.iter_mut().chain(map.inputs.values_mut()) {
+            match column {
+                ColumnMap::Name(name) => put(name),
+                ColumnMap::Full(column) => put(&mut column.column),
+            }
+        }
+        let measured = map.measured.values_mut().filter_map(|m| m.column.as_mut());
+        measured.chain(&mut map.run).for_each(put);
+        map
     }
 }
 

@@ -1,7 +1,8 @@
 //! What can be wrong with a file, said with place, expectation and finding.
 
+mod location;
+
 use loopsight_model::run::RunError;
-use std::fmt;
 use std::path::PathBuf;
 
 use loopsight_core::unit::{Dimension, UnitError};
@@ -9,32 +10,7 @@ use loopsight_formats::FormatError;
 
 use crate::names::{did_you_mean, list};
 use crate::output::OutputError;
-
-/// Where in a log a value stands.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Location {
-    /// Line of the file, from 1, where the format has lines.
-    pub line: Option<usize>,
-    /// Run, where they have names.
-    pub run: String,
-    /// Row within the run, from 1.
-    pub row: usize,
-    /// Header of the column.
-    pub column: String,
-    /// Number of the column, from 1.
-    pub column_number: usize,
-}
-
-impl fmt::Display for Location {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.line, self.run.as_str()) {
-            (Some(line), _) => write!(f, "line {line}")?,
-            (None, "") => write!(f, "row {}", self.row)?,
-            (None, run) => write!(f, "run `{run}`, row {}", self.row)?,
-        }
-        write!(f, ", column {} (`{}`)", self.column_number, self.column)
-    }
-}
+pub use location::Location;
 
 /// Why a log cannot be read, mapped or written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -226,6 +202,20 @@ pub enum RecordingError {
         name: Box<str>,
         /// The field.
         text: Box<str>,
+    },
+    /// A format that this build does not write.
+    #[error("cannot write `{}`: this program was built without the feature `all-formats` that writes Parquet", path.display())]
+    NotBuilt {
+        /// The file.
+        path: PathBuf,
+    },
+    /// `side_by_side` without a column that it is for.
+    #[error(
+        "`side_by_side` lists {count} experiments, and no column in [log] has `{{}}` where their labels stand: `column = \"u{{}}\"`"
+    )]
+    NoExperiments {
+        /// How many are listed.
+        count: usize,
     },
     /// A time stamp or an input is missing.
     #[error("{log}: {at}: the value is missing; {role} must have a value in every row")]
@@ -475,22 +465,13 @@ impl From<FormatError> for RecordingError {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_location_has_a_line_or_a_row() {
-        let mut at = Location {
-            line: Some(7),
-            run: String::new(),
-            row: 6,
-            column: "u_V".into(),
-            column_number: 2,
-        };
-        assert_eq!(at.to_string(), "line 7, column 2 (`u_V`)");
-        at.line = None;
-        at.run = "slow".into();
-        assert_eq!(at.to_string(), "run `slow`, row 6, column 2 (`u_V`)");
+impl RecordingError {
+    /// Whether a build with the feature `all-formats` would do it.
+    pub fn needs_all_formats(&self) -> bool {
+        match self {
+            RecordingError::NotBuilt { .. } => true,
+            RecordingError::Format(error) => matches!(**error, FormatError::NotBuilt { .. }),
+            _ => false,
+        }
     }
 }

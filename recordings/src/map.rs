@@ -1,7 +1,12 @@
 //! From the columns of a file to the signals of a model.
 
+mod held;
 mod short;
+mod side_by_side;
+mod tally;
+mod values;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use loopsight_core::Signal;
@@ -12,15 +17,15 @@ use loopsight_model::sensor::Sensor;
 use crate::error::RecordingError;
 use crate::fault::{Fault, FaultKind};
 use crate::faults;
-use crate::plan::{Link, Plan};
+use crate::plan::Plan;
 use crate::segment::{Segments, segment};
 use crate::source::Source;
 use crate::table::{Table, TableRun};
+pub(crate) use short::run_names;
+use tally::Tally;
 
 /// One row in so many that repeats a time stamp: the rows came in bursts.
 const BURSTS: usize = 3;
-/// Stamps beyond this, s since 1970, are in another unit.
-const NO_SECONDS: f64 = 1e11;
 /// Values of this magnitude or more, in SI units, are no measurements.
 pub(crate) const ABSURD: f64 = 1e9;
 
@@ -72,10 +77,56 @@ pub fn map(
     plant_signals: &[Signal],
     map: &LogMap,
 ) -> Result<Recording, RecordingError> {
-    let (table, map) = source.table_for(plant_inputs, plant_signals, map)?;
+    let (mut recording, table, plan) = match map.side_by_side.is_empty() {
+        true => one(source, plant_inputs, plant_signals, map, None)?,
+        false => side_by_side::all(source, plant_inputs, plant_signals, map)?,
+    };
+    if let Source::SysId(log) = source {
+        recording.faults.extend(log.notes());
+    }
+    if !table.cut.is_empty() {
+        recording.faults.push(Fault {
+            kind: FaultKind::CutLog,
+            run: String::new(),
+            signal: String::new(),
+            detail: table.cut.clone(),
+        });
+    }
+    let input_ids: Vec<&str> = plan.inputs.iter().map(|(_, id)| id.as_str()).collect();
+    let found = faults::check(&recording, &input_ids, &table, &plan);
+    recording.faults.extend(found);
+    recording
+        .faults
+        .sort_by_key(|fault| std::cmp::Reverse(fault.severity()));
+    Ok(recording)
+}
+
+/// A recording, and the table and the plan that it was made with.
+type Mapped<'s> = (Recording, Cow<'s, Table>, Plan);
+
+/// The columns of one experiment, with its label where others stand beside it.
+fn one<'s>(
+    source: &'s Source,
+    plant_inputs: &[Signal],
+    plant_signals: &[Signal],
+    map: &'s LogMap,
+    label: Option<&str>,
+) -> Result<Mapped<'s>, RecordingError> {
+    let (mut table, map) = source.table_for(plant_inputs, plant_signals, map)?;
     let plan = Plan::new(&table, plant_inputs, plant_signals, &map)?;
-    let used = table.parts(plan.time, &map)?;
+    let held = held::wanted(&table, &plan);
+    if !held.is_empty() {
+        held::hold(table.to_mut(), &held);
+    }
+    let mut used = table.parts(plan.time, &map)?;
+    if !held.is_empty() {
+        used = Cow::Owned(held::without_unknown(&table, &used, &held));
+    }
+    if let Some(label) = label {
+        side_by_side::cut(&table, &plan, used.to_mut(), label);
+    }
     let mut mapper = Mapper::new(&table, &plan);
+    mapper.own_clocks |= !held.is_empty();
     for run in &*used {
         mapper.run(run)?;
     }
@@ -87,56 +138,11 @@ pub fn map(
         time: (table.columns.get(plan.time.column)).map_or_else(String::new, |c| c.text.clone()),
         faults: Vec::new(),
     };
-    if let Source::SysId(log) = source {
-        found.extend(log.notes());
-    }
     found.extend(plan.notes.iter().cloned());
     let measured_ids: Vec<&str> = plan.measured.iter().map(|(_, m)| m.id.as_str()).collect();
     found.extend(faults::take_out_spikes(&mut recording, &measured_ids));
-    if !table.cut.is_empty() {
-        found.push(Fault {
-            kind: FaultKind::CutLog,
-            run: String::new(),
-            signal: String::new(),
-            detail: table.cut.clone(),
-        });
-    }
-    let input_ids: Vec<&str> = plan.inputs.iter().map(|(_, id)| id.as_str()).collect();
-    found.extend(faults::check(&recording, &input_ids, &table, &plan));
-    found.sort_by_key(|fault| std::cmp::Reverse(fault.severity()));
     recording.faults = found;
-    Ok(recording)
-}
-
-/// Fault of a group of runs; the names are joined when they are not all of them.
-pub(crate) fn run_names(names: &[&str], all: usize) -> String {
-    if names.len() == all {
-        return String::new();
-    }
-    let shown = |name: &&str| {
-        if name.is_empty() {
-            "#1".to_owned()
-        } else {
-            (*name).to_owned()
-        }
-    };
-    names.iter().map(shown).collect::<Vec<_>>().join(", ")
-}
-
-/// Occurrences of something in a log: how many, and the first.
-#[derive(Default)]
-struct Tally {
-    count: usize,
-    first: String,
-}
-
-impl Tally {
-    fn add(&mut self, place: impl FnOnce() -> String) {
-        if self.count == 0 {
-            self.first = place();
-        }
-        self.count += 1;
-    }
+    Ok((recording, table, plan))
 }
 
 struct Mapper<'a> {
@@ -145,6 +151,8 @@ struct Mapper<'a> {
     runs: Vec<Run>,
     names: BTreeMap<String, usize>,
     rows: usize,
+    /// What is missing in a row was never there.
+    own_clocks: bool,
     duplicates: Tally,
     backwards: Tally,
     restarts: Tally,
@@ -164,6 +172,7 @@ impl<'a> Mapper<'a> {
             runs: Vec::new(),
             names: BTreeMap::new(),
             rows: 0,
+            own_clocks: table.own_clocks,
             duplicates: Tally::default(),
             backwards: Tally::default(),
             restarts: Tally::default(),
@@ -324,60 +333,6 @@ impl<'a> Mapper<'a> {
         Ok(())
     }
 
-    /// Time stamps and inputs must be there.
-    fn check(
-        &self,
-        run: &TableRun,
-        at: usize,
-        link: Link,
-        value: f64,
-        role: &'static str,
-    ) -> Result<(), RecordingError> {
-        if value.is_nan() {
-            return Err(RecordingError::MissingValue {
-                log: self.table.source.as_str().into(),
-                at: Box::new(self.table.location(run, at, link.column)),
-                role,
-            });
-        }
-        Ok(())
-    }
-
-    /// Milliseconds since 1970 or less, taken as seconds, are no times that anybody measured at.
-    fn seconds(&self, run: &TableRun, at: usize, stamp: f64) -> Result<(), RecordingError> {
-        let unit = match stamp {
-            s if (NO_SECONDS..NO_SECONDS * 1e3).contains(&s) => "ms",
-            s if (NO_SECONDS * 1e3..NO_SECONDS * 1e6).contains(&s) => "us",
-            s if (NO_SECONDS * 1e6..NO_SECONDS * 1e9).contains(&s) => "ns",
-            _ => return Ok(()),
-        };
-        Err(RecordingError::NotSeconds {
-            log: self.table.source.as_str().into(),
-            at: Box::new(self.table.location(run, at, self.plan.time.column)),
-            stamp,
-            unit,
-        })
-    }
-
-    fn limit(
-        &self,
-        run: &TableRun,
-        at: usize,
-        link: Link,
-        value: f64,
-    ) -> Result<(), RecordingError> {
-        // A NaN here is the difference of two infinite time stamps.
-        if value.is_nan() || value.abs() >= ABSURD {
-            return Err(RecordingError::AbsurdValue {
-                log: self.table.source.as_str().into(),
-                at: Box::new(self.table.location(run, at, link.column)),
-                value,
-                limit: ABSURD,
-            });
-        }
-        Ok(())
-    }
-
     /// The runs to use, and what was done to get them.
     fn finish(self) -> Result<(Vec<Run>, Vec<Fault>), RecordingError> {
         if self.runs.is_empty() {
@@ -462,7 +417,7 @@ impl<'a> Mapper<'a> {
         }
         for (at, (_, signal)) in self.plan.measured.iter().enumerate() {
             let (missing, absurd) = (&self.missing[at], &self.absurd[at]);
-            if missing.count > 0 && !self.table.own_clocks {
+            if missing.count > 0 && !self.own_clocks {
                 let detail = format!(
                     "{} of {} samples are missing, the first at {}",
                     missing.count, self.rows, missing.first

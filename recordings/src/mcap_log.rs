@@ -1,8 +1,11 @@
 //! Logs as MCAP: rows and events as JSON messages, chunk by chunk.
 //!
-//! A row is a message of the channel `loop`, an object with the columns of a CSV log as keys and
-//! `null` for a missing value; an event is one of `events`, `{"time_s": …, "what": …}`. Times of
+//! A row is a message of the channel `loop`, an object with the columns of a CSV log as keys, without
+//! those that have no value; an event is one of `events`, `{"time_s": …, "what": …}`. Times of
 //! messages are those of the log. Numbers read back to the last place or the one beside it.
+//!
+//! Foxglove refuses a schema in which a property has several types, such as a number or `null`: each
+//! has one, and no key is required.
 //!
 //! Reference: the MCAP format, <https://mcap.dev/spec>; schemas are JSON Schema.
 
@@ -33,7 +36,7 @@ impl McapLog {
             .compression(None)
             .library(concat!("loopsight ", env!("CARGO_PKG_VERSION")));
         let mut writer = options.create(BufWriter::new(file))?;
-        let number = json!({ "type": ["number", "null"] });
+        let number = json!({ "type": "number" });
         let properties: Map<String, Value> = columns
             .iter()
             .map(|column| (column.clone(), number.clone()))
@@ -59,8 +62,8 @@ impl McapLog {
 
     /// Appends a row; the first value is the time in seconds.
     pub(crate) fn row(&mut self, row: &[f64]) -> McapResult<()> {
-        // Not finite is `null`.
-        let pairs = self.columns.iter().zip(row);
+        // JSON has finite numbers only.
+        let pairs = self.columns.iter().zip(row).filter(|(_, v)| v.is_finite());
         let object: Map<String, Value> = pairs.map(|(c, v)| (c.clone(), json!(v))).collect();
         let time = row.first().copied().unwrap_or(0.0);
         self.message(0, time, &Value::Object(object))
@@ -151,6 +154,42 @@ mod tests {
         assert_eq!(events.len(), 1);
         assert_eq!(events[0].log_time, 2_500_000_000);
         assert!(String::from_utf8_lossy(&events[0].data).contains("an actuator saturates"));
+    }
+
+    /// What Foxglove asks of a schema: an object, each of whose properties has one type; messages have no other keys.
+    #[test]
+    fn schemas_are_plain_and_hold_for_every_message() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mcap");
+        let mut log = LogWriter::create(&path, &names(&["time_s", "u_V", "y_m"])).unwrap();
+        log.write(&[0.0, 1.0, f64::NAN]).unwrap();
+        log.write(&[0.1, 1.0, 2.0]).unwrap();
+        log.remark(0.1, "stopped").unwrap();
+        log.finish().unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let mut keys = Vec::new();
+        for message in MessageStream::new(&bytes).unwrap() {
+            let message = message.unwrap();
+            let schema = message.channel.schema.as_ref().unwrap();
+            assert_eq!(
+                (&*message.channel.message_encoding, &*schema.encoding),
+                ("json", "jsonschema")
+            );
+            assert_eq!(schema.name, format!("loopsight.{}", message.channel.topic));
+            let schema: Value = serde_json::from_slice(&schema.data).unwrap();
+            assert_eq!(schema["type"], "object");
+            let data: Map<String, Value> = serde_json::from_slice(&message.data).unwrap();
+            for (key, value) in &data {
+                let number = schema["properties"][key]["type"] == "number";
+                let text = schema["properties"][key]["type"] == "string";
+                assert!(
+                    number && value.is_number() || text && value.is_string(),
+                    "{key}"
+                );
+            }
+            keys.push(data.len());
+        }
+        assert_eq!(keys, [2, 3, 2]);
     }
 
     /// What is in the part file is what a killed run leaves.

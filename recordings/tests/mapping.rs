@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use loopsight_core::Signal;
-use loopsight_model::log_map::{ColumnMap, LogMap, Measured, Ranges};
+use loopsight_model::log_map::{ColumnMap, Labels, LogMap, Measured, Ranges};
 use loopsight_recordings::{FaultKind, Recording, RecordingError, map, read_bytes};
 
 const INPUTS: [Signal; 1] = [Signal::new("voltage", "V", "V", "voltage")];
@@ -62,6 +62,45 @@ fn sums_and_differences_in_the_unit_of_the_first() {
     );
     let error = said(text, &from("plus - b", "a_rad_per_s"));
     assert!(error.contains("`b_rpm` is in rpm"), "{error}");
+}
+
+/// As other programs export channels with times of their own: a row for each stamp, empty where nothing was logged.
+#[test]
+fn an_input_with_times_of_its_own_holds_its_last_value() {
+    let row = |k: u32| match k % 4 {
+        1 => format!("{},{k},\n", f64::from(k) * 0.1),
+        _ => format!("{},,{}\n", f64::from(k) * 0.1, 10 * k),
+    };
+    let rows: String = (0..12).map(row).collect();
+    let text = format!("time_s,voltage_V,speed_rad_per_s\n{rows}");
+    let recording = mapped(&text, &LogMap::default()).unwrap();
+    let run = &recording.runs[0];
+    // What the input was in the first row is not known.
+    assert_eq!(run.inputs(), [1., 1., 1., 1., 5., 5., 5., 5., 9., 9., 9.]);
+    assert!(run.measured()[0].is_nan());
+    assert_eq!(run.measured()[1..4], [20.0, 30.0, 40.0]);
+    assert!(
+        recording
+            .faults
+            .iter()
+            .all(|f| f.kind != FaultKind::NotANumber)
+    );
+    // A part begins with what was commanded before it.
+    let part = LogMap {
+        rows: Ranges::of([(4.0, 6.0)]),
+        ..LogMap::default()
+    };
+    assert_eq!(
+        mapped(&text, &part).unwrap().runs[0].inputs(),
+        [1.0, 1.0, 5.0]
+    );
+    // One that is lost here and there is not.
+    let lost = two_seconds().replace("\n1,10,", "\n1,,");
+    let error = said(&lost, &LogMap::default());
+    assert!(
+        error.contains("line 12, column 2") && error.contains("an input must have a value"),
+        "{error}"
+    );
 }
 
 fn two_seconds() -> String {
@@ -184,4 +223,50 @@ fn stamps_of_arrival_are_said_with_the_even_clock() {
         ..LogMap::default()
     };
     assert_eq!(mapped(&text, &even).unwrap().runs[0].len(), 80);
+}
+
+/// Two experiments of a table: the second is shorter, and its commands are in another column.
+#[test]
+fn experiments_side_by_side_are_runs() {
+    let row = |k: u32| {
+        let second = match k {
+            2..30 => format!("{},{}", 3 * k, 4 * k),
+            _ => ",".to_owned(),
+        };
+        format!("{},{k},{},{second}\n", f64::from(k) * 0.1, 2 * k)
+    };
+    let rows: String = (0..41).map(row).collect();
+    let text = format!("time_s,u1,y1_rpm,u2,y2_rpm\n{rows}");
+    let mut log = LogMap {
+        side_by_side: Labels::of(["1", "2"]),
+        ..from("u{}", "y{}")
+    };
+    let recording = mapped(&text, &log).unwrap();
+    let runs: Vec<_> = recording.runs.iter().map(|r| (r.name(), r.len())).collect();
+    assert_eq!(runs, [("1", 41), ("2", 28)]);
+    let second = &recording.runs[1];
+    assert_eq!((second.time()[0], second.input(1)[0]), (0.0, 9.0));
+    let rpm = std::f64::consts::PI / 30.0;
+    assert!((second.sample(1)[0] - 12.0 * rpm).abs() < 1e-12);
+    // What is so in both is said once.
+    let units: Vec<&str> = (recording.faults.iter())
+        .filter(|f| f.kind == FaultKind::UnitAssumed)
+        .map(|f| f.detail.as_str())
+        .collect();
+    let said_once =
+        "the column `u1` does not say its unit; taken as V; so it is in each of 2 experiments";
+    assert_eq!(units, [said_once]);
+
+    log.side_by_side = Labels::of(["1", "2", "3"]);
+    let error = said(&text, &log);
+    assert!(
+        error.contains("`u3`") && error.contains("did you mean `u"),
+        "{error}"
+    );
+    let shared = LogMap {
+        side_by_side: Labels::of(["1", "2"]),
+        ..from("u1", "y1")
+    };
+    let error = said(&text, &shared);
+    assert!(error.contains("no column in [log] has `{}`"), "{error}");
 }

@@ -1,7 +1,8 @@
 //! Parquet tables.
 //!
 //! Every leaf of the schema is a channel (`pose.x`), unless it repeats within a row. Missing values
-//! are NaN. Times with a unit become seconds.
+//! are NaN. Times with a unit become seconds. Metadata `unit` or `units` of an Arrow field is the
+//! unit of its column.
 //!
 //! Reference: Apache Parquet format, <https://parquet.apache.org/docs/file-format/>.
 
@@ -18,6 +19,7 @@ use parquet::schema::types::ColumnDescPtr;
 use crate::detect::Format;
 use crate::error::FormatError;
 use crate::input::Input;
+use crate::parquet_write::{ARROW_SCHEMA, units};
 use crate::sink::{ChannelInfo, Kind, Sink, Stamps};
 
 /// Rows that are decoded at a time.
@@ -53,8 +55,13 @@ fn read_columns(input: Input, sink: &mut dyn Sink) -> Result<(), FormatError> {
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let mut stamps = Stamps::default();
     let mut columns: Vec<Column> = Vec::new();
+    let about = reader.metadata().file_metadata().key_value_metadata();
+    let arrow = about.and_then(|pairs| pairs.iter().find(|pair| pair.key == ARROW_SCHEMA));
+    let units = arrow.and_then(|pair| pair.value.as_deref()).map(units);
+    let units = units.unwrap_or_default();
     for leaf in schema.columns() {
-        columns.push(Column::announce(leaf, sink)?);
+        let unit = units.get(&leaf.path().string()).map(String::as_str);
+        columns.push(Column::announce(leaf, unit, sink)?);
     }
     for group in 0..reader.num_row_groups() {
         let rows = reader.get_row_group(group).map_err(refused)?;
@@ -93,7 +100,11 @@ struct Column {
 }
 
 impl Column {
-    fn announce(leaf: &ColumnDescPtr, sink: &mut dyn Sink) -> Result<Self, FormatError> {
+    fn announce(
+        leaf: &ColumnDescPtr,
+        declared_unit: Option<&str>,
+        sink: &mut dyn Sink,
+    ) -> Result<Self, FormatError> {
         let physical = leaf.physical_type();
         let declared = match leaf.logical_type_ref() {
             Some(logical) => format!("{logical:?}"),
@@ -109,7 +120,8 @@ impl Column {
             (_, parquet::basic::Type::BOOLEAN) => Kind::Boolean,
             _ => Kind::Number,
         };
-        let unit = matches!(what, What::Instant(_) | What::Span(_)).then_some("s");
+        let seconds = matches!(what, What::Instant(_) | What::Span(_)).then_some("s");
+        let unit = seconds.or(declared_unit);
         let path = leaf.path().string();
         let info = ChannelInfo::new(path, kind, declared).in_unit(unit);
         Ok(Self {

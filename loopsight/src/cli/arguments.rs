@@ -26,7 +26,7 @@ pub(crate) enum Command {
     Check(CheckArguments),
     /// Show what is in a log of any program, and write a model file for it.
     Inspect(InspectArguments),
-    /// Write the signals that a model has in a log, in SI units, as CSV or MCAP.
+    /// Write the signals that a model has in a log, in SI units, as CSV, MCAP or Parquet.
     Convert(ConvertArguments),
     /// List the known plants, effects, estimators, controllers and drivers.
     List(ListArguments),
@@ -124,7 +124,7 @@ pub(crate) struct ConvertArguments {
     /// Model file and log; without a model file the channels get the meaning that `inspect` finds.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
-    /// The file to write: MCAP where its name ends in `.mcap`, CSV where it ends in `.csv`.
+    /// The file to write: CSV, MCAP or Parquet, as its name ends in `.csv`, `.mcap` or `.parquet`.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
     /// JSON on standard output.

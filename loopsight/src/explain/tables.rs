@@ -44,6 +44,11 @@ pub(super) static TABLES: [PartMeta; 3] = [
                 "column of a run's number or name; another value begins a new run; by default a column `run`, where there is one",
             ),
             key(
+                "side_by_side",
+                "",
+                "experiments in columns side by side: `[1, 2, 3]`, or texts. `{}` in the names of columns stands for each in turn, and each is a run of that name; by default there is one",
+            ),
+            key(
                 "inputs_measured",
                 "",
                 "`true`: the inputs were measured at the machine, and are no commands. What driver and supply do to a command (`dead_zone`, `input_saturation`, `battery_sag`) is in them, and is not looked for. So it is with SysId's voltages; by default `false`",

@@ -17,6 +17,10 @@ const MOST: usize = 40;
 /// A `[log]` with which the log can be read, as it stands in a model file, and what in it is a guess; none where
 /// no channel would do.
 pub(crate) fn table(model: &Composed, log: &Source) -> Option<String> {
+    // One channel for all experiments would be wrong: the error names the nearest of each.
+    if !model.log.side_by_side.is_empty() {
+        return None;
+    }
     let mut filling = Filling {
         inventory: log.inventory(),
         map: model.log.clone(),

@@ -2,7 +2,6 @@
 
 use loopsight_model::run::Run;
 
-use super::run_names;
 use crate::fault::{Fault, FaultKind};
 use crate::faults;
 
@@ -48,4 +47,19 @@ pub(super) fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
     };
     let long = |run: &Run| all_short || keep || !is_short(run);
     (runs.into_iter().filter(long).collect(), Some(fault))
+}
+
+/// Fault of a group of runs; the names are joined when they are not all of them.
+pub(crate) fn run_names(names: &[&str], all: usize) -> String {
+    if names.len() == all {
+        return String::new();
+    }
+    let shown = |name: &&str| {
+        if name.is_empty() {
+            "#1".to_owned()
+        } else {
+            (*name).to_owned()
+        }
+    };
+    names.iter().map(shown).collect::<Vec<_>>().join(", ")
 }

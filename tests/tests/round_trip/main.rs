@@ -15,7 +15,7 @@ use loopsight_core::Parameter;
 use loopsight_model::config::TomlSource;
 use loopsight_model::excitation::{Between, Excitation};
 use loopsight_model::identification::LearningSettings;
-use loopsight_model::log_map::{Column, ColumnMap, Hold, LogMap, Measured, Ranges};
+use loopsight_model::log_map::{Column, ColumnMap, Hold, Labels, LogMap, Measured, Ranges};
 use loopsight_model::loop_file::LoopFile;
 use loopsight_model::model::{FitTable, Model, ModelFile, SimulationTable, misfit};
 use loopsight_model::registry::{
@@ -26,7 +26,7 @@ use loopsight_model::sensor::{Encoder, Sensor};
 use loopsight_plants as _;
 use loopsight_tests as _;
 use parts::{controller, driver, estimator, limits, supervisor};
-use proptest::collection::{btree_map, vec};
+use proptest::collection::{btree_map, btree_set, vec};
 use proptest::option;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
@@ -350,6 +350,7 @@ proptest! {
         time in option::of(column()),
         period_s in option::of(finite()),
         run in option::of(name()),
+        side_by_side in btree_set(name(), 0..3),
         inputs_measured in any::<bool>(),
         parts in (ranges(), ranges()),
         inputs in btree_map(name(), column(), 0..3),
@@ -363,6 +364,7 @@ proptest! {
                 time,
                 period_s,
                 run,
+                side_by_side: Labels::of(side_by_side),
                 inputs_measured,
                 rows: parts.0,
                 times_s: parts.1,
