@@ -29,15 +29,17 @@ const TOGETHER: usize = 2;
 /// |d(k)| > 12 s   and   |y(k+1) - y(k-1)| < |d(k)|/4
 /// ```
 ///
-/// Two side by side are absurd where each is so far from the mean of those around them.
+/// Two side by side are absurd where each is so far from the mean of those around them, over what is usual for two:
+/// an oscillation of six samples has half a wave there.
 /// (F. R. Hampel, 1974, "The influence curve and its role in robust estimation", for the scale.) With
 /// Gaussian noise one reading in 10³² is. A signal that changes by steps of its resolution has one such step
 /// as its usual size at least.
 pub(crate) fn take_out(recording: &mut Recording, ids: &[&str]) -> Vec<Fault> {
     let mut found = Vec::new();
     for (s, id) in ids.iter().enumerate() {
-        let size = usual(&recording.runs, s);
-        let absurd: Vec<Vec<usize>> = recording.runs.iter().map(|r| alone(r, s, size)).collect();
+        let sizes: [f64; TOGETHER] = std::array::from_fn(|i| usual(&recording.runs, s, i + 1));
+        let absurd = recording.runs.iter().map(|r| alone(r, s, sizes));
+        let absurd: Vec<Vec<usize>> = absurd.collect();
         let count: usize = absurd.iter().map(Vec::len).sum();
         let readings: usize = recording.runs.iter().map(Run::len).sum();
         if count == 0 || count as f64 > ACCIDENTS * readings as f64 {
@@ -79,12 +81,27 @@ fn deviation(run: &Run, s: usize, k: usize) -> f64 {
     run.sample(k)[s] - 0.5 * (run.sample(k - 1)[s] + run.sample(k + 1)[s])
 }
 
+/// How far readings `k` to `k + together` are at least from the mean of those before and after them, and how far
+/// these two are apart.
+fn apart(run: &Run, s: usize, k: usize, together: usize) -> (f64, f64) {
+    let reading = |k: usize| run.sample(k)[s];
+    let (before, after) = (reading(k - 1), reading(k + together));
+    let off = |k: usize| (reading(k) - 0.5 * (before + after)).abs();
+    let offs = (k..k + together).map(off);
+    let least = offs.reduce(|a, b| if a <= b { a } else { b });
+    (least.unwrap_or(f64::NAN), (after - before).abs())
+}
+
+/// Readings with which a group of so many may begin.
+fn groups(run: &Run, together: usize) -> std::ops::Range<usize> {
+    1..run.len().saturating_sub(together)
+}
+
 /// Usual size of that, or the resolution of the signal where that is more.
-fn usual(runs: &[Run], s: usize) -> f64 {
-    let inner = |run: &Run| 1..run.len().saturating_sub(1);
+fn usual(runs: &[Run], s: usize, together: usize) -> f64 {
     let mut all: Vec<f64> = runs
         .iter()
-        .flat_map(|run| inner(run).map(|k| deviation(run, s, k).abs()))
+        .flat_map(|run| groups(run, together).map(move |k| apart(run, s, k, together).0))
         .filter(|d| d.is_finite())
         .collect();
     if all.is_empty() {
@@ -106,17 +123,13 @@ fn usual(runs: &[Run], s: usize) -> f64 {
 }
 
 /// Readings that stand alone, or two together.
-fn alone(run: &Run, s: usize, size: f64) -> Vec<usize> {
-    let reading = |k: usize| run.sample(k)[s];
+fn alone(run: &Run, s: usize, sizes: [f64; TOGETHER]) -> Vec<usize> {
     let mut found = Vec::new();
-    for together in 1..=TOGETHER {
-        for k in 1..run.len().saturating_sub(together) {
-            let group = k..k + together;
-            let (before, after) = (reading(k - 1), reading(group.end));
-            let off = |k: usize| (reading(k) - 0.5 * (before + after)).abs();
-            let least = group.clone().map(off).fold(f64::INFINITY, f64::min);
-            if least > FAR * size && (after - before).abs() < BETWEEN * least {
-                found.extend(group);
+    for (together, size) in (1..).zip(sizes) {
+        for k in groups(run, together) {
+            let (least, between) = apart(run, s, k, together);
+            if least > FAR * size && between < BETWEEN * least {
+                found.extend(k..k + together);
             }
         }
     }
