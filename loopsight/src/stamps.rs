@@ -125,12 +125,17 @@ pub(crate) fn doubt(model: &Model, runs: &[Run]) -> Option<Doubt> {
     })
 }
 
-/// The model with values: its own, or those of its plant's example.
+/// The model with values: its own, or those of its plant's example. A plant written as expressions has none: the
+/// example is another machine.
 fn valued(model: &Model) -> Option<Model> {
     if model.missing_values().is_empty() {
         return Some(model.clone());
     }
     let (mut example, _) = Model::from_toml("example", model.plant.example).ok()?;
+    let has = |name: &str| model.parameters.iter().any(|own| own.name == name);
+    if !example.parameters.iter().all(|p| has(&p.name)) {
+        return None;
+    }
     let values: Vec<f64> = example
         .parameters
         .iter()
@@ -322,6 +327,17 @@ mod tests {
         assert_eq!(unit(&model, &recorded(0.5, 10.0, 0.0)), None);
         // A thousand time constants from sample to sample: in milliseconds it would be one.
         assert_eq!(unit(&model, &recorded(0.5, 600.0, 0.0)), Some("ms"));
+    }
+
+    /// Expressions without values may be any machine, however slow.
+    #[test]
+    fn expressions_without_values_are_not_doubted() {
+        let text = "[plant.expression.states]\nheat = { unit = \"K\", rate = \"(gain * power - heat) / slow\" }\n\
+                    [plant.expression.inputs]\npower = { unit = \"1\" }\n\
+                    [plant.expression.parameters]\ngain = { unit = \"K\" }\nslow = { unit = \"s\" }\n\
+                    [log.measured.heat]\n";
+        let oven = Model::from_toml("oven.toml", text).unwrap().0;
+        assert_eq!(unit(&oven, &recorded(300.0, 5.0, 0.0)), None);
     }
 
     /// Without values the plant's example stands for the machine, and only whole stamps are doubted.
