@@ -1,6 +1,7 @@
 //! Steps as long as the motion allows, with an estimate of their error.
 
 use super::Simulator;
+use super::step::Way;
 use crate::registry::HostReal;
 
 /// Steps per sample up to which the usual ones are taken: they cost little, and keep their digits.
@@ -10,25 +11,34 @@ const PAST: usize = 8;
 /// Difference between a step and two of half its length, relative to the largest value of a state so far.
 /// The two are off by a fifteenth of it.
 const TOLERANCE: f64 = 1e-5;
+/// Steps per sample from which the model may be stiff, and the method for that is tried, too.
+const STIFF: usize = 64;
+/// Steps of that method beyond which the other one is tried again: then the motion is fast, but not stiff.
+const NOT_STIFF: usize = 4 * STIFF;
 
 /// What is kept for steps of a length that suits the motion.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lengthened<S> {
     /// Steps of the last interval.
     steps: usize,
+    /// How they were made.
+    way: Way,
     /// Largest magnitude of each state so far.
     size: Vec<f64>,
     before: Vec<S>,
     coarse: Vec<S>,
+    explicit: Vec<S>,
 }
 
 impl<S: HostReal> Lengthened<S> {
     pub(crate) fn new(states: usize) -> Self {
         Self {
             steps: 1,
+            way: Way::Explicit,
             size: vec![0.0; states],
             before: vec![S::zero(); states],
             coarse: vec![S::zero(); states],
+            explicit: vec![S::zero(); states],
         }
     }
 
@@ -57,7 +67,7 @@ impl<S: HostReal> Simulator<'_, S> {
     }
 
     /// Integrates over `span` with as few steps as the motion allows and no more than `most`: as few that
-    /// twice as many come to the same place.
+    /// twice as many come to the same place, by a method for stiff models where that needs far fewer.
     ///
     /// An oven with a fastest time constant of 50 s, sampled every 5 s, needs two steps per sample; a robot's step
     /// would make two thousand. Halving is the error estimate of L. F. Richardson (E. Hairer, S. P. Nørsett, G.
@@ -67,25 +77,73 @@ impl<S: HostReal> Simulator<'_, S> {
         let Some(mut kept) = self.lengthened.take() else {
             return self.integrate(input, span, most, true);
         };
-        let mut steps = (kept.steps / 4).clamp(1, most);
         kept.before.clone_from(&self.x);
-        self.integrate(input, span, steps, false);
+        let mut way = match kept.way {
+            Way::Implicit if kept.steps < NOT_STIFF => Way::Implicit,
+            _ => Way::Explicit,
+        };
+        let mut linearised = false;
+        let mut steps = (kept.steps / 4).clamp(1, most);
+        self.integrate_by(way, input, span, steps, &mut linearised);
         while steps < most {
             kept.coarse.clone_from(&self.x);
             self.x.clone_from(&kept.before);
             steps = (2 * steps).min(most);
-            self.integrate(input, span, steps, false);
+            self.integrate_by(way, input, span, steps, &mut linearised);
             if kept.agrees(&self.x) {
                 break;
             }
+            if way == Way::Explicit && steps >= STIFF {
+                kept.explicit.clone_from(&self.x);
+                self.x.clone_from(&kept.before);
+                self.integrate_by(Way::Implicit, input, span, steps / 2, &mut linearised);
+                kept.coarse.clone_from(&self.x);
+                self.x.clone_from(&kept.before);
+                self.integrate_by(Way::Implicit, input, span, steps, &mut linearised);
+                if kept.agrees(&self.x) {
+                    way = Way::Implicit;
+                    break;
+                }
+                self.x.clone_from(&kept.explicit);
+            }
         }
+        kept.way = way;
         kept.steps = steps;
         kept.keep(&self.x);
         if !self.bounds.output_memory.is_empty() {
             // The past of a sensor needs some points, too.
             self.x.clone_from(&kept.before);
-            self.integrate(input, span, steps.max(PAST).min(most), true);
+            let steps = steps.max(PAST).min(most);
+            if way == Way::Implicit {
+                self.implicit.prepare(span / steps as f64);
+            }
+            self.way = way;
+            self.integrate(input, span, steps, true);
         }
+        self.way = Way::Explicit;
         self.lengthened = Some(kept);
+    }
+
+    /// Integrates over `span` in so many steps made one `way`. The Jacobian of the interval's start is made once.
+    fn integrate_by(
+        &mut self,
+        way: Way,
+        input: &[f64],
+        span: f64,
+        steps: usize,
+        linearised: &mut bool,
+    ) {
+        let h = span / steps as f64;
+        if way == Way::Implicit {
+            if !*linearised {
+                self.apply(input, 0.0);
+                self.way = Way::Linearise;
+                self.step(self.time, h);
+                *linearised = true;
+            }
+            self.implicit.prepare(h);
+        }
+        self.way = way;
+        self.integrate(input, span, steps, false);
     }
 }

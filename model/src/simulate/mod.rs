@@ -10,6 +10,8 @@ mod ramp;
 mod sensing;
 mod start;
 mod state_observer;
+mod step;
+mod stiff;
 mod values;
 
 use std::borrow::Cow;
@@ -24,9 +26,10 @@ pub use follow::{follow, free_run, try_follow};
 use history::{Between, History};
 use lengthen::Lengthened;
 use push::Pushed;
-use ramp::{hold_means, ramped};
 use sensing::{Integral, Sensing, sense};
 pub use state_observer::StateObserver;
+use step::Way;
+use stiff::Implicit;
 
 /// Integrates a model through time.
 ///
@@ -45,6 +48,8 @@ pub struct Simulator<'m, S> {
     sensors: Vec<Sensing>,
     histories: Vec<History<S>>,
     rk4: Rk4<Vec<S>>,
+    implicit: Implicit<S>,
+    way: Way,
     x: Vec<S>,
     scratch: Scratch<S>,
     pushed: Pushed<S>,
@@ -140,6 +145,8 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             values: values.to_vec(),
             histories,
             rk4: Rk4::new(vec![S::zero(); size]),
+            implicit: Implicit::new(size),
+            way: Way::Explicit,
             x: vec![S::zero(); size],
             scratch: Scratch {
                 held: vec![S::zero(); nu],
@@ -310,151 +317,6 @@ impl<'m, S: HostReal> Simulator<'m, S> {
                 self.refresh();
                 self.remember();
             }
-        }
-    }
-
-    /// One integration step, from the inputs in `held`; leaves those at its end there.
-    fn step(&mut self, from: f64, h: f64) {
-        let Self {
-            model,
-            p,
-            values,
-            bounds,
-            sensors,
-            histories,
-            rk4,
-            x,
-            scratch,
-            pushed,
-            needed,
-            slopes,
-            ..
-        } = self;
-        let model: &Model = model;
-        let ramping = slopes.iter().any(|s| *s != 0.0);
-        if ramping {
-            hold_means(bounds, histories, &mut scratch.held, slopes, from, h);
-        }
-        for bound in &bounds.input_memory {
-            let (Some(history), Place::Input(i)) = (bound.history, bound.place) else {
-                continue;
-            };
-            let interval = (from, from + h);
-            let scene = Scene {
-                model,
-                values,
-                x,
-                signals: &scratch.signals,
-                time: from,
-                interval,
-            };
-            let nominal = scratch.held[i];
-            scratch.held[i] += scene.contribution(bound, nominal, &histories[history]);
-        }
-        for (held, push) in scratch.held.iter_mut().zip(&pushed.inputs) {
-            *held += *push;
-        }
-        scratch.w.copy_from_slice(&pushed.efforts);
-        let (nx, nu) = (model.n_states(), model.plant.inputs.len());
-        let dynamics = S::dynamics(model.dynamics);
-        if bounds.idle() && x.len() == nx && pushed.rates.is_empty() && !ramping {
-            // Nothing changes what acts on the plant within the step: half the time.
-            dynamics.step(x, S::of(h), &scratch.held, &scratch.w, p);
-            return;
-        }
-        let Scratch {
-            held,
-            u,
-            w,
-            signals,
-        } = scratch;
-        rk4.step(x, S::of(h), |stage, x, dx| {
-            let time = from + h * [0.0, 0.5, 0.5, 1.0][stage];
-            let interval = (time, time);
-            let plant_x = &x[..nx];
-            u.copy_from_slice(held);
-            if ramping {
-                ramped(u, bounds, slopes, time - from);
-            }
-            signals[..nx].copy_from_slice(plant_x);
-            let refresh = |u: &[S], signals: &mut [S]| {
-                signals[nx..nx + nu].copy_from_slice(u);
-                for index in needed.iter() {
-                    signals[nx + nu + index] = dynamics.output(*index, plant_x, u, p);
-                }
-            };
-            refresh(u, signals);
-            if !bounds.inputs.is_empty() {
-                let scene = Scene {
-                    model,
-                    values,
-                    x,
-                    signals,
-                    time,
-                    interval,
-                };
-                for bound in &bounds.inputs {
-                    let Place::Input(i) = bound.place else {
-                        continue;
-                    };
-                    scene.rates(bound, u[i], &NoPast, dx);
-                    let add = scene.contribution(bound, u[i], &NoPast);
-                    u[i] += add;
-                }
-                refresh(u, signals);
-            }
-            let scene = Scene {
-                model,
-                values,
-                x,
-                signals,
-                time,
-                interval,
-            };
-            if !bounds.efforts.is_empty() {
-                w.copy_from_slice(&pushed.efforts);
-                for bound in &bounds.efforts {
-                    let Place::Effort(i) = bound.place else {
-                        continue;
-                    };
-                    scene.rates(bound, w[i], &NoPast, dx);
-                    let add = scene.contribution(bound, w[i], &NoPast);
-                    w[i] += add;
-                }
-            }
-            dynamics.derivative(plant_x, u, w, p, &mut dx[..nx]);
-            for (rate, push) in dx.iter_mut().zip(&pushed.rates) {
-                *rate += *push;
-            }
-            for bound in &bounds.bodies {
-                let Place::Rate(i) = bound.place else {
-                    continue;
-                };
-                let nominal = dx[i];
-                scene.rates(bound, nominal, &NoPast, dx);
-                dx[i] += scene.contribution(bound, nominal, &NoPast);
-            }
-            for bound in bounds.outputs.iter().filter(|b| b.n_z > 0) {
-                let Place::Output(i) = bound.place else {
-                    continue;
-                };
-                scene.rates(bound, signals[i], &NoPast, dx);
-            }
-            for sensor in sensors.iter() {
-                let Integral::State(to) = sensor.integral else {
-                    continue;
-                };
-                let mut value = signals[sensor.index];
-                for bound in &bounds.outputs {
-                    if bound.place == Place::Output(sensor.index) {
-                        value += scene.contribution(bound, value, &NoPast);
-                    }
-                }
-                dx[to] = value;
-            }
-        });
-        if ramping {
-            ramped(held, bounds, slopes, h);
         }
     }
 

@@ -1,0 +1,176 @@
+//! One integration step: what acts on the plant, and by which method it moves.
+
+use super::bound::Scene;
+use super::ramp::{hold_means, ramped};
+use super::sensing::Integral;
+use super::{Scratch, Simulator};
+use crate::model::Model;
+use crate::registry::HostReal;
+use loopsight_core::{NoPast, Place};
+
+/// What a step does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Way {
+    /// A step of Runge and Kutta's method.
+    #[default]
+    Explicit,
+    /// A step of the method for stiff models.
+    Implicit,
+    /// The state stays, and the Jacobian of its rates is kept for such steps.
+    Linearise,
+}
+
+impl<S: HostReal> Simulator<'_, S> {
+    /// One integration step, from the inputs in `held`; leaves those at its end there.
+    pub(super) fn step(&mut self, from: f64, h: f64) {
+        let Self {
+            model,
+            p,
+            values,
+            bounds,
+            sensors,
+            histories,
+            rk4,
+            implicit,
+            way,
+            x,
+            scratch,
+            pushed,
+            needed,
+            slopes,
+            ..
+        } = self;
+        let model: &Model = model;
+        let ramping = slopes.iter().any(|s| *s != 0.0);
+        if ramping {
+            hold_means(bounds, histories, &mut scratch.held, slopes, from, h);
+        }
+        for bound in &bounds.input_memory {
+            let (Some(history), Place::Input(i)) = (bound.history, bound.place) else {
+                continue;
+            };
+            let interval = (from, from + h);
+            let scene = Scene {
+                model,
+                values,
+                x,
+                signals: &scratch.signals,
+                time: from,
+                interval,
+            };
+            let nominal = scratch.held[i];
+            scratch.held[i] += scene.contribution(bound, nominal, &histories[history]);
+        }
+        for (held, push) in scratch.held.iter_mut().zip(&pushed.inputs) {
+            *held += *push;
+        }
+        scratch.w.copy_from_slice(&pushed.efforts);
+        let (nx, nu) = (model.n_states(), model.plant.inputs.len());
+        let dynamics = S::dynamics(model.dynamics);
+        let plain = bounds.idle() && x.len() == nx && pushed.rates.is_empty() && !ramping;
+        if plain && *way == Way::Explicit {
+            // Nothing changes what acts on the plant within the step: half the time.
+            dynamics.step(x, S::of(h), &scratch.held, &scratch.w, p);
+            return;
+        }
+        let Scratch {
+            held,
+            u,
+            w,
+            signals,
+        } = scratch;
+        let rates = |stage: usize, x: &[S], dx: &mut [S]| {
+            let time = from + h * [0.0, 0.5, 0.5, 1.0][stage];
+            let interval = (time, time);
+            let plant_x = &x[..nx];
+            u.copy_from_slice(held);
+            if ramping {
+                ramped(u, bounds, slopes, time - from);
+            }
+            signals[..nx].copy_from_slice(plant_x);
+            let refresh = |u: &[S], signals: &mut [S]| {
+                signals[nx..nx + nu].copy_from_slice(u);
+                for index in needed.iter() {
+                    signals[nx + nu + index] = dynamics.output(*index, plant_x, u, p);
+                }
+            };
+            refresh(u, signals);
+            if !bounds.inputs.is_empty() {
+                let scene = Scene {
+                    model,
+                    values,
+                    x,
+                    signals,
+                    time,
+                    interval,
+                };
+                for bound in &bounds.inputs {
+                    let Place::Input(i) = bound.place else {
+                        continue;
+                    };
+                    scene.rates(bound, u[i], &NoPast, dx);
+                    let add = scene.contribution(bound, u[i], &NoPast);
+                    u[i] += add;
+                }
+                refresh(u, signals);
+            }
+            let scene = Scene {
+                model,
+                values,
+                x,
+                signals,
+                time,
+                interval,
+            };
+            if !bounds.efforts.is_empty() {
+                w.copy_from_slice(&pushed.efforts);
+                for bound in &bounds.efforts {
+                    let Place::Effort(i) = bound.place else {
+                        continue;
+                    };
+                    scene.rates(bound, w[i], &NoPast, dx);
+                    let add = scene.contribution(bound, w[i], &NoPast);
+                    w[i] += add;
+                }
+            }
+            dynamics.derivative(plant_x, u, w, p, &mut dx[..nx]);
+            for (rate, push) in dx.iter_mut().zip(&pushed.rates) {
+                *rate += *push;
+            }
+            for bound in &bounds.bodies {
+                let Place::Rate(i) = bound.place else {
+                    continue;
+                };
+                let nominal = dx[i];
+                scene.rates(bound, nominal, &NoPast, dx);
+                dx[i] += scene.contribution(bound, nominal, &NoPast);
+            }
+            for bound in bounds.outputs.iter().filter(|b| b.n_z > 0) {
+                let Place::Output(i) = bound.place else {
+                    continue;
+                };
+                scene.rates(bound, signals[i], &NoPast, dx);
+            }
+            for sensor in sensors.iter() {
+                let Integral::State(to) = sensor.integral else {
+                    continue;
+                };
+                let mut value = signals[sensor.index];
+                for bound in &bounds.outputs {
+                    if bound.place == Place::Output(sensor.index) {
+                        value += scene.contribution(bound, value, &NoPast);
+                    }
+                }
+                dx[to] = value;
+            }
+        };
+        match way {
+            Way::Explicit => rk4.step(x, S::of(h), rates),
+            Way::Implicit => implicit.step(x, h, rates),
+            Way::Linearise => implicit.linearise(x, rates),
+        }
+        if ramping {
+            ramped(held, bounds, slopes, h);
+        }
+    }
+}
