@@ -14,10 +14,12 @@ use crate::solve::Effort;
 
 /// Spans of the regressions that a fit may start from, s.
 const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
-/// Scattered starts.
-const SCATTERED: usize = 8;
+/// Scattered starts. Each costs one free run; the best of them are followed.
+const SCATTERED: usize = 32;
 /// Where a parameter has no range, scattered starts reach this many decades above and below its value.
 const DECADES: f64 = 1.5;
+/// The same where the file gives no value: only the unit is known.
+const DECADES_UNKNOWN: f64 = 3.0;
 /// Most other starts that are tried, the best first.
 const OTHERS: usize = 6;
 /// Effort spent on each start but the first.
@@ -114,7 +116,8 @@ impl Problem<'_> {
         if best.error > criteria.poor {
             starts.truncate(OTHERS);
             if best.error > criteria.lost {
-                starts.extend(self.scattered(&best.solution.values)?);
+                // Not around where it went astray.
+                starts.extend(self.scattered(&declared(self.model))?);
             }
             let mut furthest: Option<Attempt> = None;
             for start in &starts {
@@ -283,7 +286,11 @@ fn scatter(parameter: &ModelParameter, value: f64, share: f64) -> f64 {
     } else {
         (size.signum(), share)
     };
-    let value = sign * size.abs() * 10f64.powf(DECADES * (2.0 * share - 1.0));
+    let decades = match parameter.value {
+        Some(_) => DECADES,
+        None => DECADES_UNKNOWN,
+    };
+    let value = sign * size.abs() * 10f64.powf(decades * (2.0 * share - 1.0));
     parameter.declaration.nearest(value)
 }
 
