@@ -110,6 +110,7 @@ mod solve;
 mod starts;
 mod stride;
 mod sufficiency;
+mod timing;
 pub mod tracking;
 mod trial;
 mod unshown;

@@ -253,7 +253,11 @@ impl Problem<'_> {
         let blocks = self.blocks(&residual, &jacobian);
         let inverse = flatness.inverse(&norms);
         let n_signals = self.model.measured.len();
-        let covariance = noise::covariance(&blocks, n_signals, &inverse, norms.len(), &self.work)?;
+        let mut covariance =
+            noise::covariance(&blocks, n_signals, &inverse, norms.len(), &self.work)?;
+        if let Some(shift) = self.shift(solution, &residual, &jacobian, &inverse)? {
+            shift.widen(&mut covariance);
+        }
 
         let mut fitted = self.model.clone();
         fitted.set_values(&values);

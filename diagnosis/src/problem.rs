@@ -212,7 +212,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Weight of row `row` of run `run`; zero where the fit may not look.
-    fn weight(&self, run: usize, row: usize) -> f64 {
+    pub(crate) fn weight(&self, run: usize, row: usize) -> f64 {
         let n_signals = self.weights.len();
         if self.seen.is_some_and(|seen| !seen[run][row / n_signals]) {
             return 0.0;

@@ -30,11 +30,11 @@ const HEADER: &str = "\
 # The blind table
 
 What `loopsight diagnose` concludes from recordings that hide an effect, fitted to one recording and
-judged on a multi-level one with other seeds: three sizes (half, once and twice what is noticeable),
-pseudo-random binary and mixed inputs, and recordings of every machine that hide nothing. The seeds follow
-from the version number, so that they are fresh with every version. Remade by
+judged on a multi-level one with other seeds, and recordings of every machine that hide nothing. A size of 1 is what
+is noticeable; inputs are pseudo-random binary, or mixed. The seeds follow from the version number, so that they are
+fresh with every version. This table has {what}. Remade by
 
-    cargo run --release -p loopsight-tests --example blind_table -- --write examples/hidden-effect/BLIND.md
+    cargo run --release -p loopsight-tests --example blind_table -- {arguments}
 
 `right`: the effect itself, or one in a class with it that the diagnosis says it cannot tell from it,
 comes first, or the log cannot show it and is said to show none, or not what it is. `first`: the effect itself
@@ -75,7 +75,9 @@ struct Held {
     name: &'static str,
     found: f64,
     truth: f64,
-    /// The 95 % interval holds the truth; none without an interval.
+    /// Half the 95 % interval; none without one.
+    half: Option<f64>,
+    /// That interval holds the truth.
     covered: Option<bool>,
 }
 
@@ -162,7 +164,13 @@ fn main() {
                 100.0 * row.floor,
                 row.estimates
                     .iter()
-                    .map(|h| format!("{} {:.4} (true {:.4})", h.name, h.found, h.truth))
+                    .map(|h| format!(
+                        "{} {:.4} ± {:.4} (true {:.4})",
+                        h.name,
+                        h.found,
+                        h.half.unwrap_or(f64::NAN),
+                        h.truth
+                    ))
                     .collect::<Vec<_>>()
                     .join(", ")
             );
@@ -173,11 +181,24 @@ fn main() {
     println!("{table}");
     let file = argument("--write", "");
     if !file.is_empty() {
-        match std::fs::write(&file, format!("{HEADER}{table}")) {
+        let words: Vec<String> = std::env::args().skip(1).collect();
+        let header = HEADER
+            .replace("{arguments}", &words.join(" "))
+            .replace("{what}", &extent(&sizes, experiments.len(), seeds, clean));
+        match std::fs::write(&file, format!("{header}{table}")) {
             Ok(()) => eprintln!("wrote {file}"),
             Err(error) => eprintln!("{file}: {error}"),
         }
     }
+}
+
+/// What a table covers, in words.
+fn extent(sizes: &[f64], experiments: usize, seeds: u64, clean: u64) -> String {
+    let sizes: Vec<String> = sizes.iter().map(f64::to_string).collect();
+    format!(
+        "effects of size {}, {experiments} kinds of input, {seeds} seed(s) of each, and {clean} clean recordings",
+        sizes.join(", ")
+    )
 }
 
 /// The first seed: drawn from the version number, by the FNV-1a hash of its digits.
@@ -245,6 +266,7 @@ fn try_one(case: Case, windings: f64) -> Option<Row> {
                         name: q.name,
                         found: estimate.value,
                         truth: q.value,
+                        half: estimate.interval95.map(|[low, high]| 0.5 * (high - low)),
                         covered: estimate
                             .interval95
                             .map(|[low, high]| (low..=high).contains(&q.value)),
