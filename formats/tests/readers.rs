@@ -264,16 +264,22 @@ fn a_cut_log_is_read_up_to_the_cut() {
         (common::wpilog(), "u"),
         (common::ulog(), "rate[1].x"),
         (common::mat(), "u"),
+        (common::mcap::json(Packed::No, true), "/drive/u"),
     ] {
-        let whole = first(&log(bytes.clone()), path);
-        let mut seen = 0;
+        let uncut = log(bytes.clone());
+        assert!(uncut.cut.is_none(), "{path}: {:?}", uncut.cut);
+        let whole = first(&uncut, path);
+        let (mut seen, mut said) = (0, 0);
         for end in (bytes.len() / 3..bytes.len()).step_by(7) {
             let input = Input::from_bytes(bytes[..end].to_vec(), "cut").unwrap();
             let log = read(input).unwrap_or_else(|e| panic!("{path} at {end}: {e}"));
             let now = first(&log, path);
             assert!(now >= seen && now <= whole, "{path} at {end}: {now}");
+            said += usize::from(log.cut.is_some());
             seen = now;
         }
         assert!(seen > 0, "{path}");
+        // Between two records nothing is missing that could be seen.
+        assert!(said > 0, "{path}: never called cut");
     }
 }
