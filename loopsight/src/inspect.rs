@@ -123,6 +123,13 @@ fn examined(
     log: Option<&Log>,
     options: &InspectOptions,
 ) -> Result<InspectAnswer> {
+    if inventory.channels.is_empty() {
+        let notes = inventory.notes.iter().map(|note| format!("; {note}"));
+        let (format, notes) = (&inventory.format, notes.collect::<String>());
+        return Err(Error::request(format!(
+            "{name}: this {format} log has no channels{notes}"
+        )));
+    }
     let known = Known::new(inventory, options)?;
     let mut plants: Vec<(f64, usize, FittingPlant)> = Vec::new();
     for meta in registry::plants() {
@@ -327,4 +334,38 @@ fn summary(answer: &InspectAnswer) -> String {
         None => text.push_str(" No plant of the library fits its channels by their names."),
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(log: &str, bytes: &[u8]) -> Result<InspectAnswer> {
+        inspect(
+            &Log::from_bytes(log, bytes).unwrap(),
+            &InspectOptions::default(),
+        )
+    }
+
+    #[test]
+    fn a_log_without_channels_is_refused() {
+        let error = found("l.mcap", b"\x89MCAP0\r\n").unwrap_err();
+        assert_eq!(error.exit_status(), 2);
+        let said = error.to_string();
+        assert!(
+            said.contains("l.mcap: this MCAP log has no channels"),
+            "{said}"
+        );
+    }
+
+    /// A remark stands on the line that it is about: an effect that is added later comes behind it.
+    #[test]
+    fn a_unit_that_is_not_said_is_told_beside_the_column() {
+        let row = |k: u32| format!("{},{},{}\n", 0.01 * f64::from(k), k / 50 % 3, k % 50);
+        let rows: String = (0..500).map(row).collect();
+        let answer = found("l.csv", format!("t,u,omega\n{rows}").as_bytes()).unwrap();
+        let text = answer.model_toml.unwrap();
+        let line = "column = \"omega\" # the log does not say its unit; taken as SI\n";
+        assert!(text.ends_with(line), "{text}");
+    }
 }

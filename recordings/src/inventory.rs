@@ -187,7 +187,12 @@ fn unit(declared: Option<&str>, path: &str) -> Option<UnitFact> {
         ("current", "A"),
         ("rpm", "rpm"),
     ];
-    let found = guesses.iter().find(|(word, _)| words.contains(word));
+    // "Current Gyro Yaw" is the yaw now, "MotorCurrent" and "current_1" are in amperes.
+    let now = words
+        .strip_prefix("current")
+        .is_some_and(|rest| rest.contains(char::is_alphabetic));
+    let found =
+        (guesses.iter()).find(|(word, _)| words.contains(word) && !(now && *word == "current"));
     found.map(|(_, unit)| fact(unit, "a guess from the name"))
 }
 
@@ -224,6 +229,15 @@ mod tests {
             Some(("V".into(), "a guess from the name"))
         );
         assert_eq!((of("omega"), of("weights[1]")), (None, None));
+        assert_eq!(
+            (of("NT:/Current Gyro Yaw"), of("currentAngle")),
+            (None, None)
+        );
+        let ampere = Some(("A".into(), "a guess from the name"));
+        assert_eq!(
+            (of("Current_1"), of("motorCurrent")),
+            (ampere.clone(), ampere)
+        );
         assert_eq!(unit(Some("rad"), "x").unwrap().why, "the file says so");
     }
 }

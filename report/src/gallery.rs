@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use loopsight_diagnosis::{Comparison, Conclusion};
-use loopsight_recordings::{Fault, FaultKind, output};
+use loopsight_recordings::{Fault, FaultKind, output, read_bytes};
 
 use crate::findings::{diagnosis, improvement, pair};
 use crate::fixtures::{comparison, context, friction_runs, loop_record};
 use crate::{
     Context, LoopRecord, comparison_page, diagnosis_page, figure_svg, fit, improvement_page,
-    run_page,
+    inventory_page, run_page,
 };
 
 /// Writes the pages into the folder that `LOOPSIGHT_PAGES` names.
@@ -27,12 +27,33 @@ fn pages_to_look_at() {
     write(&folder, "run.html", &run_page(&context(), &record));
     let none = LoopRecord::default();
     write(&folder, "run_nothing.html", &run_page(&context(), &none));
+    inventory(&folder);
     let figure = crate::figure::tests::velocities(2500);
     write(&folder, "figure.svg", &figure_svg(&figure));
 }
 
 fn write(folder: &Path, name: &str, text: &str) {
     output::save(&folder.join(name), text.as_bytes()).unwrap();
+}
+
+/// A log whose channels change, pause, stand still, say something and have long names.
+fn inventory(folder: &Path) {
+    let row = |k: u32| {
+        let (time, angle) = (0.01 * f64::from(k), 0.003 * f64::from(k));
+        let pause = if k < 900 { 0.0 } else { 4.0 };
+        let mode = if k < 500 { "drive" } else { "turn" };
+        let loud = 5.0 * angle.sin() + f64::from(k % 13);
+        format!("{},{},{loud},7,{mode}\n", time + pause, k / 100 % 3)
+    };
+    let rows: String = (0..2500).map(row).collect();
+    let text = format!(
+        "time_s,u_V,SmartDashboard/Drivetrain/Left Encoder Speed (m/s),supply_V,mode\n{rows}"
+    );
+    let inventory = read_bytes(text.as_bytes(), "log").unwrap().inventory();
+    let summary = "CSV, 5 channels, 28.99 s. `dc_axis` fits its channels.";
+    let model = Some("[plant.dc_axis]\n\n[log.inputs]\nvoltage = \"u_V\"\n");
+    let page = inventory_page(&context(), summary, &inventory, model);
+    write(folder, "inspect.html", &page);
 }
 
 /// Runs: one, five, long ones, one signal of one, none.

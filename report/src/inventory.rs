@@ -183,7 +183,7 @@ mod tests {
         let page = page(&format!("t_s,u_V,<w>,mode\n{rows}"));
         assert_eq!(page.matches("<svg").count(), 3);
         assert!(page.contains("<code>&lt;w&gt;</code>") && !page.contains("<w>"));
-        assert!(page.contains("<li><code>mode</code>: 20000 text"));
+        assert!(page.contains("<li><code>mode</code>: 20000 texts"));
         assert!(page.contains("[plant.dc_axis]"));
         assert!(page.len() < 40_000, "{}", page.len());
         assert!(!page.contains(library()) && !page.contains("://"));
@@ -192,9 +192,9 @@ mod tests {
     #[test]
     fn what_does_not_change_is_told_in_words() {
         let said = page("t_s,u_V\n0,5\n1,5\n");
-        assert!(said.contains("<li><code>u_V</code>: 2 number"), "{said}");
+        assert!(said.contains("<li><code>u_V</code>: 2 numbers"), "{said}");
         let said = page("t_s,u_V\n0,nan\n1,nan\n");
-        assert!(said.contains("<li><code>u_V</code>: 2 number"), "{said}");
+        assert!(said.contains("<li><code>u_V</code>: 2 numbers"), "{said}");
         let said = page("t_s,u_V\n0,inf\n1,1e300\n");
         assert!(!said.contains("NaN"), "{said}");
     }

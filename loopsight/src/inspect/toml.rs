@@ -99,12 +99,16 @@ pub(super) fn model(
         lines.push(String::new());
         lines.push(format!("[log.measured.{}]", signal.id));
         let doubt = doubt(plant, signal, false, inventory).filter(|_| !named);
-        let doubt = doubt.map_or_else(String::new, |d| format!(" # {d}"));
-        lines.push(format!("column = {}{doubt}", quoted(&signal.channel)));
-        match unit(signal) {
-            Some(unit) => lines.push(format!("unit = {}", quoted(unit))),
-            None => lines.push("# The log does not say its unit; taken as SI.".to_owned()),
-        }
+        // On the line itself: what is appended to the file later comes before what stands behind it.
+        let assumed = unit(signal).is_none();
+        let assumed = assumed.then(|| "the log does not say its unit; taken as SI".to_owned());
+        let remarks: Vec<String> = doubt.into_iter().chain(assumed).collect();
+        let remarks = match remarks.is_empty() {
+            true => String::new(),
+            false => format!(" # {}", remarks.join("; ")),
+        };
+        lines.push(format!("column = {}{remarks}", quoted(&signal.channel)));
+        lines.extend(unit(signal).map(|unit| format!("unit = {}", quoted(unit))));
     }
     lines.push(String::new());
     lines.join("\n")

@@ -4,19 +4,20 @@ use loopsight_recordings::{ChannelFacts, Kind};
 
 use super::number;
 
-/// What kind of values a channel has.
-pub fn kind(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Number => "number",
-        Kind::Boolean => "boolean",
-        Kind::Text => "text",
-        Kind::Opaque => "opaque",
-    }
+/// So many values of a kind.
+fn values(count: usize, kind: Kind) -> String {
+    let (one, several) = match kind {
+        Kind::Number => ("number", "numbers"),
+        Kind::Boolean => ("boolean", "booleans"),
+        Kind::Text => ("text", "texts"),
+        Kind::Opaque => ("opaque value", "opaque values"),
+    };
+    format!("{count} {}", if count == 1 { one } else { several })
 }
 
 /// What is known of a channel, on one line: how many values, unit, rate, range, texts, what is missing, pauses.
 pub fn facts(channel: &ChannelFacts) -> String {
-    let mut parts = vec![format!("{} {}", channel.values, kind(channel.kind))];
+    let mut parts = vec![values(channel.values, channel.kind)];
     if let Some(unit) = &channel.unit {
         parts.push(match unit.why {
             "the file says so" => unit.unit.clone(),
@@ -39,7 +40,10 @@ pub fn facts(channel: &ChannelFacts) -> String {
     if let Some(clock) = channel.clock {
         if clock.gaps > 0 {
             let longest = number(clock.longest_gap);
-            parts.push(format!("{} pauses, the longest {longest} s", clock.gaps));
+            parts.push(match clock.gaps {
+                1 => format!("a pause of {longest} s"),
+                gaps => format!("{gaps} pauses, the longest {longest} s"),
+            });
         }
         if clock.backwards > 0 {
             parts.push(format!("time goes back {} times", clock.backwards));
@@ -60,11 +64,11 @@ mod tests {
         let inventory = read_bytes(text.as_bytes(), "log").unwrap().inventory();
         let said: Vec<String> = inventory.channels.iter().map(facts).collect();
         let clock = "10 Hz";
-        let pause = "1 pauses, the longest 1 s";
+        let pause = "a pause of 1 s";
         assert_eq!(
             said[1],
-            format!("4 number, V (the end of the name), {clock}, 1 to 3, 25 % missing, {pause}")
+            format!("4 numbers, V (the end of the name), {clock}, 1 to 3, 25 % missing, {pause}")
         );
-        assert_eq!(said[2], format!("4 text, {clock}, up | down, {pause}"));
+        assert_eq!(said[2], format!("4 texts, {clock}, up | down, {pause}"));
     }
 }
