@@ -103,6 +103,24 @@ pub(crate) fn noise(
     (noise, tally.std())
 }
 
+/// Standard deviation of what rounding alone adds to the `signal`-th measured signal: counts of an encoder, or the
+/// least change in the log.
+pub(crate) fn rounding(sensor: &Sensor, signal: usize, runs: &[Run]) -> f64 {
+    if let Sensor::EncoderCounts(encoder) = sensor {
+        let periods = runs.iter().map(Run::median_period);
+        return encoder.noise(periods.fold(f64::INFINITY, f64::min));
+    }
+    let mut tally = Tally::default();
+    let mut changes = Vec::new();
+    for run in runs {
+        let values = (0..run.len()).map(|k| run.sample(k)[signal]);
+        let values: Vec<f64> = values.filter(|y| y.is_finite()).collect();
+        values.iter().for_each(|y| tally.add(*y, *y));
+        changes.extend(difference(&values, 1).map(f64::abs));
+    }
+    resolution(&changes, tally.rms()) / 12f64.sqrt()
+}
+
 /// Orders of the differences.
 const ORDERS: usize = 4;
 

@@ -12,8 +12,9 @@ use crate::prediction::predict_with;
 use crate::problem::Problem;
 use crate::progress::Cancelled;
 
-/// Standard errors beyond which a shift is none of chance: the two-sided quantile of 95 %.
-const NORMAL: f64 = 1.96;
+/// Standard errors beyond which a shift counts: `√2`, from where a model with it predicts better (H. Akaike, 1974, "A new
+/// look at the statistical model identification").
+const EARNED: f64 = std::f64::consts::SQRT_2;
 
 /// A shift of the response in time, in periods of the log, as it stands in a linearised fit.
 pub(crate) struct Shift {
@@ -41,8 +42,8 @@ impl Problem<'_> {
     /// ```
     ///
     /// What is left of `d` beside the parameters, `e = d - J (JᵀJ)⁻¹ Jᵀ d`, tells the shift itself: `δ = -eᵀr/eᵀe`, with
-    /// the standard error `s` of coloured noise. A `δ` beyond the quantile of the intervals is an error of the model, and
-    /// moves the parameters by that much; a smaller one is chance. Where a log cannot tell it better than its clock is
+    /// the standard error `s` of coloured noise. A `δ` beyond `√2` of these is an error of the model, and moves the
+    /// parameters by that much; a smaller one is chance. Where a log cannot tell it better than its clock is
     /// known, that is what it may be: a delay among the parameters leaves nothing of `d`. (The bias of an omitted
     /// regressor: H. Theil, 1957, "Specification errors and the estimation of economic relationships".)
     pub(crate) fn shift(
@@ -71,7 +72,7 @@ impl Problem<'_> {
             let variance = noise::covariance(&blocks, n_signals, &inverse, 1, &self.work)?[(0, 0)];
             let error = variance.max(0.0).sqrt();
             let tells = error < known;
-            if tells && found.abs() <= NORMAL * error {
+            if tells && found.abs() <= EARNED * error {
                 return Ok(None);
             }
             if tells { found.abs() } else { known }

@@ -7,6 +7,7 @@ use loopsight_model::simulate::{Simulator, try_follow};
 use serde::Serialize;
 
 use crate::criteria::FailsCriteria;
+use crate::floor::rounding;
 use crate::motion::{Motion, changes, rest, speed};
 use crate::prediction::Solution;
 use crate::progress::{Cancelled, Work};
@@ -88,6 +89,9 @@ const PARTS: usize = 16;
 
 /// Whether a quantity of the model predicts the error of a measured signal on held-out parts of the log. Then that
 /// error is not noise.
+///
+/// Rounding is no noise either: at a level that returns it is the same each time. What is predicted must be more than
+/// that leaves.
 pub(crate) fn predictable(
     model: &Model,
     solution: &Solution,
@@ -96,7 +100,11 @@ pub(crate) fn predictable(
 ) -> Result<bool, Cancelled> {
     let least = work.criteria().missing.predicted;
     let all = collect(model, solution, runs, work)?;
-    Ok(all.iter().any(|samples| {
+    let signals = model.measured.iter().zip(&all).enumerate();
+    Ok(signals.into_iter().any(|(i, (measured, samples))| {
+        let squares: f64 = samples.error.iter().map(|e| e * e).sum();
+        let rounded = rounding(&measured.sensor, i, runs).powi(2) * samples.error.len() as f64;
+        let least = least.max(rounded / squares);
         let mut quantities = samples.quantities.iter();
         quantities.any(|values| predicted(values, &samples.error) > least)
     }))
