@@ -170,7 +170,7 @@ criteria! {
         /// Standard error over the value beyond which the log does not determine a parameter.
         undetermined: f64 = 1.0 "1", Judgement: "not even its sign is known";
         /// The residuals are more than noise if a quantity of the model predicts this share of their square on held-out blocks.
-        predicted: f64 = 0.1 "1", Judgement: "held-out noise cannot be predicted, and a model is never exactly the machine";
+        predicted: f64 = 0.2 "1", Judgement: "twice the most in 60 clean recordings; held-out noise cannot be predicted, and a model is never exactly the machine";
         /// Where the plain model leaves as much as a constant would, an effect must reduce that to this share.
         rescued: f64 = 0.5 "1", Judgement: "it then explains half of the signal";
         /// Error over the floor below which the model explains the log.

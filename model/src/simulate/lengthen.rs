@@ -1,7 +1,7 @@
 //! Steps as long as the motion allows, with an estimate of their error.
 
 use super::Simulator;
-use super::step::Way;
+use super::stiff::Way;
 use crate::registry::HostReal;
 
 /// Steps per sample up to which the usual ones are taken: they cost little, and keep their digits.

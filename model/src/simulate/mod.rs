@@ -28,8 +28,7 @@ use lengthen::Lengthened;
 use push::Pushed;
 use sensing::{Integral, Sensing, sense};
 pub use state_observer::StateObserver;
-use step::Way;
-use stiff::Implicit;
+use stiff::{Implicit, Way};
 
 /// Integrates a model through time.
 ///

@@ -3,22 +3,11 @@
 use super::bound::Scene;
 use super::ramp::{hold_means, ramped};
 use super::sensing::Integral;
+use super::stiff::Way;
 use super::{Scratch, Simulator};
 use crate::model::Model;
 use crate::registry::HostReal;
 use loopsight_core::{NoPast, Place};
-
-/// What a step does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Way {
-    /// A step of Runge and Kutta's method.
-    #[default]
-    Explicit,
-    /// A step of the method for stiff models.
-    Implicit,
-    /// The state stays, and the Jacobian of its rates is kept for such steps.
-    Linearise,
-}
 
 impl<S: HostReal> Simulator<'_, S> {
     /// One integration step, from the inputs in `held`; leaves those at its end there.

@@ -9,6 +9,18 @@ const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 /// Difference for the Jacobian, relative to a state: the root of the rounding error.
 const DIFFERENCE: f64 = 1e-8;
 
+/// What a step does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Way {
+    /// A step of Runge and Kutta's method.
+    #[default]
+    Explicit,
+    /// A step of the method for stiff models.
+    Implicit,
+    /// The state stays, and the Jacobian of its rates is kept for such steps.
+    Linearise,
+}
+
 /// The Rosenbrock method ROS2, for `x' = f(x)`:
 ///
 /// ```text
