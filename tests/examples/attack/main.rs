@@ -18,6 +18,7 @@ mod twins;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 use loopsight_tests::Random;
@@ -139,16 +140,22 @@ fn campaign(target: &Target, number: u64, count: u64) -> Tally {
         while !handles.iter().all(|h| h.is_finished()) {
             std::thread::sleep(Duration::from_millis(50));
             let now = clock.elapsed().as_millis() as u64;
-            let hangs = |at: &AtomicU64| {
+            let hangs = |(at, handle): (&AtomicU64, &ScopedJoinHandle<'_, Tally>)| {
                 let at = at.load(Ordering::Relaxed);
-                at > 0 && now > at + 6 * LONGEST.as_millis() as u64
+                !handle.is_finished() && at > 0 && now > at + 6 * LONGEST.as_millis() as u64
             };
-            if begun.iter().any(hangs) {
+            if begun.iter().zip(&handles).any(hangs) {
                 eprintln!("{}: hangs", target.name);
                 std::process::exit(1);
             }
         }
-        let tallies = handles.into_iter().map(|h| h.join().unwrap());
+        let tallies = handles.into_iter().map(|h| {
+            h.join().unwrap_or_else(|_| {
+                // Not a damaged input: what is damaged was not taken for right before.
+                eprintln!("{}: the undamaged inputs are refused", target.name);
+                std::process::exit(1)
+            })
+        });
         tallies.fold(Tally::default(), Tally::and)
     })
 }
