@@ -163,9 +163,9 @@ fn denhams_flywheel_has_friction_and_measures_late() {
     found.begins_with_friction(0.65..0.75);
     assert!((0.11..0.135).contains(&found.late()), "{} s", found.late());
     assert!(found.last() < 0.006, "{:?}", found.unseen);
-    // What is left, half a percent, still depends on the position of the shaft, on blocks that did not
-    // choose it. So it is not called noise.
-    assert_eq!(found.verdict, "unknown_effect");
+    // Half a percent is left, where the floor is a third. A tenth of its square depends on the position of the shaft:
+    // clean recordings of hidden machines leave as much.
+    assert_eq!(found.verdict, "nothing_missing");
 }
 
 /// An arm that moves over 0.23 rad cannot carry its model, and the reason is said.
