@@ -120,6 +120,20 @@ impl Candidate {
         }
         chosen
     }
+
+    /// `start` with a hundredth of the sizes of the effect: its linear parameters that are zero without it. None where
+    /// it has none, or they are nothing already.
+    pub(crate) fn faint(&self, start: &[f64]) -> Option<Vec<f64>> {
+        let mut faint = start.to_vec();
+        for i in self.own() {
+            let parameter = &self.model.parameters[i];
+            let declaration = parameter.declaration;
+            if parameter.free && declaration.linear && declaration.default == Some(0.0) {
+                faint[i] *= 0.01;
+            }
+        }
+        (faint != start).then_some(faint)
+    }
 }
 
 /// All candidates for `model`: each effect at every single channel it fits, and at all channels of a

@@ -145,11 +145,30 @@ impl Search<'_> {
         let of = (looked.len() + attempts.len() + waiting) as u64;
         self.work.tell(Stage::FirstLooks, looked.len() as u64, of);
         let found = attempts.par_iter().filter_map(|(i, start)| {
-            let found = look(&self.all[*i].chosen(start), start, self.nominal);
+            let found = self.look(*i, start);
             self.tell(Stage::FirstLooks, &done, of);
             Some((*i, found?))
         });
         looked.extend(found.collect::<Vec<_>>());
+    }
+
+    /// A short fit of a candidate, from its start. The plain model is its special case. Where the fit ended well above
+    /// that one, the start was too strong for this machine, and it is made again from next to nothing.
+    fn look(&self, i: usize, start: &[f64]) -> Option<Judged> {
+        let candidate = &self.all[i];
+        let found = look(&candidate.chosen(start), start, self.nominal);
+        let most = self.criteria().elsewhere * nrmse(self.nominal.rank);
+        if found.as_ref().is_some_and(|found| found.error() <= most) {
+            return found;
+        }
+        let again = candidate.faint(start).and_then(|faint| {
+            let chosen = candidate.chosen(&faint);
+            look(&chosen, &faint, self.nominal)
+        });
+        found
+            .into_iter()
+            .chain(again)
+            .min_by(|a, b| a.error().total_cmp(&b.error()))
     }
 
     /// Whether a candidate should start from where another one ended. Strong breakaway friction is found when
