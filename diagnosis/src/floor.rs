@@ -83,14 +83,13 @@ pub(crate) fn noise(
     let noise = match sensor {
         Sensor::EncoderCounts(encoder) => encoder.noise(period),
         Sensor::Instantaneous | Sensor::IntervalMean => {
-            let resolution = resolution(&differences[0], tally.rms()) / 12f64.sqrt();
             let orders = differences.into_iter().zip(1..);
             let white = orders
                 .filter(|(sizes, _)| !sizes.is_empty())
                 .map(|(sizes, order)| median(sizes) / 0.6745 / gain(order).sqrt())
                 .fold(f64::INFINITY, f64::min);
             let white = if white.is_finite() { white } else { 0.0 };
-            let white = white.max(resolution);
+            let white = white.max(rounding(sensor, signal, runs));
             let hold = median(holds);
             let age = if hold > criteria.repeats_periods * period {
                 rate.rms() * hold / 12f64.sqrt()

@@ -100,8 +100,8 @@ pub(crate) fn predictable(
 ) -> Result<bool, Cancelled> {
     let least = work.criteria().missing.predicted;
     let all = collect(model, solution, runs, work)?;
-    let signals = model.measured.iter().zip(&all).enumerate();
-    Ok(signals.into_iter().any(|(i, (measured, samples))| {
+    let mut measured = model.measured.iter().zip(&all).enumerate();
+    Ok(measured.any(|(i, (measured, samples))| {
         let squares: f64 = samples.error.iter().map(|e| e * e).sum();
         let rounded = rounding(&measured.sensor, i, runs).powi(2) * samples.error.len() as f64;
         let least = least.max(rounded / squares);

@@ -79,14 +79,4 @@ pub enum FormatError {
         /// Bytes allowed.
         limit: u64,
     },
-    /// Nothing in it that is a channel.
-    #[error("{log}: the {format} file holds no channels{}{detail}", if detail.is_empty() { "" } else { ": " })]
-    NoChannels {
-        /// The file.
-        log: Box<str>,
-        /// Its format.
-        format: Format,
-        /// What is in it instead.
-        detail: Box<str>,
-    },
 }

@@ -162,7 +162,8 @@ impl Input {
                 .take(limit + 1)
                 .read_to_end(&mut bytes),
             Content::Zstd => unpack_zstd(source, limit + 1, &mut bytes),
-            _ => unpack_utf16(source, limit, &mut bytes),
+            Content::Utf16 { little } => unpack_utf16(source, little, limit, &mut bytes),
+            _ => Ok(0),
         };
         // What was unpacked before the cut is there; the reader finds that it ends too early.
         match read {
@@ -338,12 +339,17 @@ pub(crate) fn unpack_zstd(
 }
 
 /// As UTF-8, without the mark of the order of bytes; what is no letter becomes U+FFFD.
-fn unpack_utf16(source: impl Read, limit: u64, bytes: &mut Vec<u8>) -> io::Result<usize> {
+fn unpack_utf16(
+    source: impl Read,
+    little: bool,
+    limit: u64,
+    bytes: &mut Vec<u8>,
+) -> io::Result<usize> {
     let mut raw = Vec::new();
     source.take(limit).read_to_end(&mut raw)?;
-    let unit = match raw.first() {
-        Some(0xff) => u16::from_le_bytes,
-        _ => u16::from_be_bytes,
+    let unit = match little {
+        true => u16::from_le_bytes,
+        false => u16::from_be_bytes,
     };
     let units = raw
         .chunks_exact(2)

@@ -1,6 +1,7 @@
 //! How the columns of a log map on the signals of a model.
 
 mod labels;
+mod list;
 mod ranges;
 
 use std::collections::BTreeMap;

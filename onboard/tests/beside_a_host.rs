@@ -4,7 +4,7 @@
 
 mod twil;
 
-use loopsight_core::{AffineModel, Command, Observation, Observer, Sample, Tick};
+use loopsight_core::{AffineModel, Command, Observation, Observer, Plant, Sample, Tick};
 use loopsight_estimators::Rls;
 use loopsight_estimators::RlsSettings;
 use loopsight_link::{Attachment, Unusable};
@@ -16,17 +16,8 @@ use loopsight_plants::Ddmr;
 use nalgebra::Const;
 use twil::*;
 
-const FILE: &str = r#"
-[plant.ddmr]
-K_A = -15.146
-K_B = 0.005
-K_C = 0.136
-K_D = -9.573
-K_E = -3.945
-K_F = 0.656
-half_track = 0.131
-wheel_radius = 0.05
-
+/// What the robot has beside its plant.
+const BESIDE: &str = r#"
 [log.measured.linear_velocity]
 [log.measured.angular_velocity]
 
@@ -44,7 +35,8 @@ coefficient = 0.4
 
 /// The levels of the effects are known: aboard they are not learned.
 fn model() -> Model {
-    let (mut model, _) = Model::from_toml("model.toml", FILE).unwrap();
+    let file = format!("{}{BESIDE}", <Ddmr as Plant>::META.example);
+    let (mut model, _) = Model::from_toml("model.toml", &file).unwrap();
     let n = model.plant.parameters.len();
     for parameter in &mut model.parameters[n..] {
         parameter.free = false;

@@ -48,6 +48,12 @@ struct Wish<'m> {
 }
 
 impl Plan {
+    /// The columns of the inputs that are logged.
+    pub(crate) fn input_columns(&self) -> impl Iterator<Item = usize> + '_ {
+        let logged = self.inputs.iter().filter_map(|(link, _)| link.as_ref());
+        logged.map(|link| link.column)
+    }
+
     pub(crate) fn new(
         table: &Table,
         inputs: &[Signal],

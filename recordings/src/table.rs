@@ -1,6 +1,7 @@
 //! A log as it stands in its file: named columns of numbers.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::error::{Location, RecordingError};
 use crate::naming;
@@ -71,6 +72,18 @@ impl TableRun {
             Some(line) => Some(*line),
             None if self.first_line > 0 => Some(self.first_line + row),
             None => None,
+        }
+    }
+
+    /// Some of its rows, each of `width` values.
+    pub(crate) fn part(&self, rows: Range<usize>, width: usize) -> Self {
+        let Range { start, end } = rows;
+        let values = self.rows.get(start * width..end * width);
+        Self {
+            name: self.name.clone(),
+            rows: values.unwrap_or_default().to_vec(),
+            first_line: self.line(start).unwrap_or(0),
+            lines: self.lines.get(start..end).unwrap_or_default().to_vec(),
         }
     }
 }

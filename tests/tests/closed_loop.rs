@@ -6,27 +6,18 @@
 )]
 
 use loopsight_controllers::{PiResponse, settling_time};
-use loopsight_core::{Controller, Driver, DriverFault, Loop, Rk4, Sample, SimulatedClock};
+use loopsight_core::{Controller, Driver, DriverFault, Loop, Plant, Rk4, Sample, SimulatedClock};
 use loopsight_model::affine::Affine;
 use loopsight_model::config::TomlSource;
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, ControllerPart};
-use loopsight_plants as _;
+use loopsight_plants::Ddmr;
 
 const PERIOD: f64 = 0.01;
 /// Integration steps of the robot per period.
 const FINE: usize = 10;
 
-const PAPER: &str = "[plant.ddmr]
-K_A = -15.146
-K_B = 0.005
-K_C = 0.136
-K_D = -9.573
-K_E = -3.945
-K_F = 0.656
-half_track = 0.131
-wheel_radius = 0.05
-";
+const PAPER: &str = <Ddmr as Plant>::META.example;
 
 /// The velocities of the paper's robot, integrated finely, with every step kept.
 struct Robot {

@@ -9,27 +9,18 @@ use allocation_counter::measure;
 use loopsight_controllers::FeedbackLinearizingPiSettings;
 use loopsight_core::{
     AffineModel, Clock, Controller, Driver, DriverFault, Estimator, Loop, Observation, Observer,
-    Sample, SimulatedClock, Tick,
+    Plant, Sample, SimulatedClock, Tick,
 };
 use loopsight_estimators::{Rls, RlsSettings};
 use loopsight_model::model::Model;
 use loopsight_model::registry::{ControllerPart, EstimatorPart};
 use loopsight_model::simulate::Simulator;
-use loopsight_plants as _;
+use loopsight_plants::Ddmr;
 use nalgebra::{DVector, SVector};
 
 const PERIOD: f64 = 0.01;
 
-const PAPER: &str = "[plant.ddmr]
-K_A = -15.146
-K_B = 0.005
-K_C = 0.136
-K_D = -9.573
-K_E = -3.945
-K_F = 0.656
-half_track = 0.131
-wheel_radius = 0.05
-";
+const PAPER: &str = <Ddmr as Plant>::META.example;
 
 const WITH_EFFECTS: &str = "
 [[effect]]

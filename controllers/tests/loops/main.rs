@@ -12,25 +12,17 @@ mod tracking;
 mod truth;
 
 use loopsight_controllers as _;
+use loopsight_core::Plant;
 use loopsight_drivers as _;
 use loopsight_estimators as _;
 use loopsight_model::config::TomlSource;
 use loopsight_model::loop_file::{Composed, LoopFile};
 use loopsight_model::model::Model;
 use loopsight_model::registry::{BuildError, DriverContext};
-use loopsight_plants as _;
+use loopsight_plants::Ddmr;
 
 /// The paper's robot, its velocities as they are.
-pub(crate) const TWIL: &str = "[plant.ddmr]
-K_A = -15.146
-K_B = 0.005
-K_C = 0.136
-K_D = -9.573
-K_E = -3.945
-K_F = 0.656
-half_track = 0.131
-wheel_radius = 0.05
-";
+pub(crate) const TWIL: &str = <Ddmr as Plant>::META.example;
 
 /// Its velocities as they are at the instant.
 pub(crate) const INSTANT: &str = "[log.measured]

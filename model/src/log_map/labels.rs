@@ -1,9 +1,8 @@
 //! Names of experiments that stand side by side in a log: a list of texts or whole numbers.
 
-use std::fmt;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use serde::de::{self, Deserialize, Deserializer, SeqAccess, Visitor};
-use serde::{Serialize, Serializer};
+use super::list::list;
 
 /// What stands for `{}` in the names of columns, once for each experiment; none: there is one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -27,42 +26,33 @@ impl Labels {
 }
 
 /// An element of the list.
-#[derive(serde::Deserialize)]
+#[derive(Deserialize)]
 #[serde(untagged)]
 enum Element {
     Number(i64),
     Text(String),
 }
 
-struct List;
+const EXPECTED: &str = "a list of texts or whole numbers: `[1, 2, 3]`";
 
-impl<'de> Visitor<'de> for List {
-    type Value = Labels;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a list of texts or whole numbers: `[1, 2, 3]`")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Labels, A::Error> {
-        let wrong = || de::Error::custom("expected a list of texts or whole numbers: `[1, 2, 3]`");
-        let mut labels: Vec<String> = Vec::new();
-        while let Some(element) = list.next_element::<Element>().map_err(|_| wrong())? {
-            let label = match element {
-                Element::Number(number) => number.to_string(),
-                Element::Text(text) => text,
-            };
-            if labels.contains(&label) {
-                return Err(de::Error::custom(format!("`{label}` is listed twice")));
-            }
-            labels.push(label);
+fn labels(elements: Vec<Element>) -> Result<Labels, String> {
+    let mut labels: Vec<String> = Vec::new();
+    for element in elements {
+        let label = match element {
+            Element::Number(number) => number.to_string(),
+            Element::Text(text) => text,
+        };
+        if labels.contains(&label) {
+            return Err(format!("`{label}` is listed twice"));
         }
-        Ok(Labels(labels))
+        labels.push(label);
     }
+    Ok(Labels(labels))
 }
 
 impl<'de> Deserialize<'de> for Labels {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_seq(List)
+        list(deserializer, EXPECTED, labels)
     }
 }
 

@@ -1,9 +1,8 @@
 //! Parts of a log: `[from, to]`, or a list of them.
 
-use std::fmt;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use serde::de::{self, Deserialize, Deserializer, SeqAccess, Visitor};
-use serde::{Serialize, Serializer};
+use super::list::list;
 
 /// Parts of a log, both ends included; none: all of it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,52 +26,41 @@ impl Ranges {
 }
 
 /// An element of the list.
-#[derive(serde::Deserialize)]
+#[derive(Deserialize)]
 #[serde(untagged)]
 enum Element {
     Number(f64),
     Pair((f64, f64)),
 }
 
-struct Parts;
+const EXPECTED: &str = "`[from, to]`, or a list of such pairs";
 
-impl<'de> Visitor<'de> for Parts {
-    type Value = Ranges;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("`[from, to]`, or a list of such pairs")
+fn ranges(elements: Vec<Element>) -> Result<Ranges, String> {
+    let (mut numbers, mut pairs) = (Vec::new(), Vec::new());
+    for element in elements {
+        match element {
+            Element::Number(number) => numbers.push(number),
+            Element::Pair(pair) => pairs.push(pair),
+        }
     }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Ranges, A::Error> {
-        let wrong = || de::Error::custom("expected `[from, to]`, or a list of such pairs");
-        let (mut numbers, mut pairs) = (Vec::new(), Vec::new());
-        while let Some(element) = list.next_element::<Element>().map_err(|_| wrong())? {
-            match element {
-                Element::Number(number) => numbers.push(number),
-                Element::Pair(pair) => pairs.push(pair),
-            }
-        }
-        match (numbers.as_slice(), pairs.is_empty()) {
-            ([from, to], true) => pairs.push((*from, *to)),
-            ([], false) => {}
-            _ => return Err(wrong()),
-        }
-        // Written so that a NaN is refused, too.
-        if let Some((from, to)) = pairs
-            .iter()
-            .find(|(from, to)| !matches!(from.partial_cmp(to), Some(o) if o.is_le()))
-        {
-            return Err(de::Error::custom(format!(
-                "the part [{from}, {to}] ends before it begins"
-            )));
-        }
-        Ok(Ranges(pairs))
+    match (numbers.as_slice(), pairs.is_empty()) {
+        ([from, to], true) => pairs.push((*from, *to)),
+        ([], false) => {}
+        _ => return Err(format!("expected {EXPECTED}")),
     }
+    // Written so that a NaN is refused, too.
+    if let Some((from, to)) = pairs
+        .iter()
+        .find(|(from, to)| !matches!(from.partial_cmp(to), Some(o) if o.is_le()))
+    {
+        return Err(format!("the part [{from}, {to}] ends before it begins"));
+    }
+    Ok(Ranges(pairs))
 }
 
 impl<'de> Deserialize<'de> for Ranges {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_seq(Parts)
+        list(deserializer, EXPECTED, ranges)
     }
 }
 

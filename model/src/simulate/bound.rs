@@ -118,6 +118,7 @@ fn reads_position(model: &Model, channel: &Channel) -> Option<usize> {
 }
 
 /// What an effect is evaluated with.
+#[derive(Clone, Copy)]
 pub(crate) struct Scene<'a, S> {
     pub(crate) model: &'a Model,
     /// Parameter values of the whole model.

@@ -144,7 +144,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             values: values.to_vec(),
             histories,
             rk4: Rk4::new(vec![S::zero(); size]),
-            implicit: Implicit::new(size),
+            implicit: Implicit::new(),
             way: Way::Explicit,
             x: vec![S::zero(); size],
             scratch: Scratch {

@@ -38,14 +38,13 @@ impl<S: HostReal> Simulator<'_, S> {
             let (Some(history), Place::Input(i)) = (bound.history, bound.place) else {
                 continue;
             };
-            let interval = (from, from + h);
             let scene = Scene {
                 model,
                 values,
                 x,
                 signals: &scratch.signals,
                 time: from,
-                interval,
+                interval: (from, from + h),
             };
             let nominal = scratch.held[i];
             scratch.held[i] += scene.contribution(bound, nominal, &histories[history]);
@@ -70,7 +69,6 @@ impl<S: HostReal> Simulator<'_, S> {
         } = scratch;
         let rates = |stage: usize, x: &[S], dx: &mut [S]| {
             let time = from + h * [0.0, 0.5, 0.5, 1.0][stage];
-            let interval = (time, time);
             let plant_x = &x[..nx];
             u.copy_from_slice(held);
             if ramping {
@@ -84,15 +82,16 @@ impl<S: HostReal> Simulator<'_, S> {
                 }
             };
             refresh(u, signals);
+            let now = Scene {
+                model,
+                values,
+                x,
+                signals: &[],
+                time,
+                interval: (time, time),
+            };
             if !bounds.inputs.is_empty() {
-                let scene = Scene {
-                    model,
-                    values,
-                    x,
-                    signals,
-                    time,
-                    interval,
-                };
+                let scene = Scene { signals, ..now };
                 for bound in &bounds.inputs {
                     let Place::Input(i) = bound.place else {
                         continue;
@@ -103,14 +102,7 @@ impl<S: HostReal> Simulator<'_, S> {
                 }
                 refresh(u, signals);
             }
-            let scene = Scene {
-                model,
-                values,
-                x,
-                signals,
-                time,
-                interval,
-            };
+            let scene = Scene { signals, ..now };
             if !bounds.efforts.is_empty() {
                 w.copy_from_slice(&pushed.efforts);
                 for bound in &bounds.efforts {

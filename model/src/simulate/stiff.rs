@@ -46,15 +46,15 @@ pub(super) struct Implicit<S> {
 }
 
 impl<S: HostReal> Implicit<S> {
-    /// For so many states; nothing is kept before it is needed.
-    pub(super) fn new(states: usize) -> Self {
+    /// Nothing is kept before a model is stiff.
+    pub(super) fn new() -> Self {
         Self {
             jacobian: DMatrix::zeros(0, 0),
             inverse: DMatrix::zeros(0, 0),
-            k1: Vec::with_capacity(states),
-            k2: Vec::with_capacity(states),
-            stage: Vec::with_capacity(states),
-            rate: Vec::with_capacity(states),
+            k1: Vec::new(),
+            k2: Vec::new(),
+            stage: Vec::new(),
+            rate: Vec::new(),
         }
     }
 
@@ -134,7 +134,7 @@ mod tests {
             dx[0] = -0.3 * x[0] * x[0];
             dx[1] = 500.0 * (x[0].sin() - x[1]);
         };
-        let mut method = Implicit::new(2);
+        let mut method = Implicit::new();
         let h = 5.0 / steps as f64;
         for _ in 0..steps {
             method.linearise(&x, f);
@@ -159,7 +159,7 @@ mod tests {
         let f = |_: usize, x: &[f64], dx: &mut [f64]| dx[0] = -x[0] * x[0];
         let error = |steps: usize| {
             let mut x = [1.0];
-            let mut method = Implicit::new(1);
+            let mut method = Implicit::new();
             method.linearise(&[0.5], f);
             method.prepare(1.0 / steps as f64);
             for _ in 0..steps {

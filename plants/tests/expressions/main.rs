@@ -9,7 +9,7 @@
 
 mod mistakes;
 
-use loopsight_core::{AffineModel, Place, Real, Role};
+use loopsight_core::{AffineModel, Place, Plant, Real, Role};
 use loopsight_model::expression::{EffectDraft, ParameterDraft};
 use loopsight_model::model::Model;
 use loopsight_model::registry::{HostReal, effects};
@@ -17,18 +17,9 @@ use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
 use loopsight_model::simulate::{Simulator, free_run};
 use loopsight_model::{Dual, derivative, variable};
-use loopsight_plants as _;
+use loopsight_plants::Ddmr;
 
-const TWIL: &str = "[plant.ddmr]
-K_A = -15.146
-K_B = 0.005
-K_C = 0.136
-K_D = -9.573
-K_E = -3.945
-K_F = 0.656
-half_track = 0.131
-wheel_radius = 0.05
-";
+const TWIL: &str = <Ddmr as Plant>::META.example;
 
 const FRICTION: &str = "
 [[effect]]

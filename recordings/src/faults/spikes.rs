@@ -37,7 +37,9 @@ const TOGETHER: usize = 2;
 pub(crate) fn take_out(recording: &mut Recording, ids: &[&str]) -> Vec<Fault> {
     let mut found = Vec::new();
     for (s, id) in ids.iter().enumerate() {
-        let sizes: [f64; TOGETHER] = std::array::from_fn(|i| usual(&recording.runs, s, i + 1));
+        let least = 0.5 * usual_change(&recording.runs, s);
+        let sizes: [f64; TOGETHER] =
+            std::array::from_fn(|i| usual(&recording.runs, s, i + 1).max(least));
         let absurd = recording.runs.iter().map(|r| alone(r, s, sizes));
         let absurd: Vec<Vec<usize>> = absurd.collect();
         let count: usize = absurd.iter().map(Vec::len).sum();
@@ -50,7 +52,7 @@ pub(crate) fn take_out(recording: &mut Recording, ids: &[&str]) -> Vec<Fault> {
             let mut measured = run.measured().to_vec();
             let width = run.n_measured();
             for k in absurd {
-                let off = deviation(run, s, *k).abs();
+                let (off, _) = apart(run, s, *k, 1);
                 if off > worst.0 {
                     worst = (off, run.sample(*k)[s], run.time()[*k]);
                 }
@@ -76,13 +78,8 @@ pub(crate) fn take_out(recording: &mut Recording, ids: &[&str]) -> Vec<Fault> {
     found
 }
 
-/// How far a reading is from the mean of its neighbours; NaN where one is missing.
-fn deviation(run: &Run, s: usize, k: usize) -> f64 {
-    run.sample(k)[s] - 0.5 * (run.sample(k - 1)[s] + run.sample(k + 1)[s])
-}
-
 /// How far readings `k` to `k + together` are at least from the mean of those before and after them, and how far
-/// these two are apart.
+/// these two are apart; NaN where one is missing.
 fn apart(run: &Run, s: usize, k: usize, together: usize) -> (f64, f64) {
     let reading = |k: usize| run.sample(k)[s];
     let (before, after) = (reading(k - 1), reading(k + together));
@@ -97,16 +94,21 @@ fn groups(run: &Run, together: usize) -> std::ops::Range<usize> {
     1..run.len().saturating_sub(together)
 }
 
-/// Usual size of that, or the resolution of the signal where that is more.
+/// Usual size of that.
 fn usual(runs: &[Run], s: usize, together: usize) -> f64 {
     let mut all: Vec<f64> = runs
         .iter()
         .flat_map(|run| groups(run, together).map(move |k| apart(run, s, k, together).0))
         .filter(|d| d.is_finite())
         .collect();
-    if all.is_empty() {
-        return f64::INFINITY;
+    match all.is_empty() {
+        true => f64::INFINITY,
+        false => median(&mut all) / 0.6745,
     }
+}
+
+/// Usual size of a change: of those that there are the one in the middle, because a coarse signal seldom changes.
+fn usual_change(runs: &[Run], s: usize) -> f64 {
     let steps = runs.iter().flat_map(|run| {
         let values: Vec<f64> = signal(run, s).collect();
         values
@@ -114,12 +116,11 @@ fn usual(runs: &[Run], s: usize, together: usize) -> f64 {
             .map(|w| (w[1] - w[0]).abs())
             .collect::<Vec<_>>()
     });
-    // Of the changes that there are the one in the middle: a coarse signal seldom changes.
     let mut steps: Vec<f64> = steps.filter(|d| *d > 0.0).collect();
-    if steps.is_empty() {
-        return f64::INFINITY;
+    match steps.is_empty() {
+        true => f64::INFINITY,
+        false => median(&mut steps),
     }
-    (median(&mut all) / 0.6745).max(0.5 * median(&mut steps))
 }
 
 /// Readings that stand alone, or two together.

@@ -10,11 +10,7 @@ const VALUES: usize = 3;
 
 /// The columns of inputs and of the run's number that have times of their own.
 pub(super) fn wanted(table: &Table, plan: &Plan) -> Vec<usize> {
-    let inputs = plan
-        .inputs
-        .iter()
-        .filter_map(|(link, _)| Some(link.as_ref()?.column));
-    let mut columns: Vec<usize> = inputs.chain(plan.run).collect();
+    let mut columns: Vec<usize> = plan.input_columns().chain(plan.run).collect();
     columns.sort_unstable();
     columns.dedup();
     let all: usize = table.runs.iter().map(|run| table.rows(run).len()).sum();
@@ -51,16 +47,9 @@ pub(super) fn without_unknown(
     let width = table.columns.len().max(1);
     let from_first = |run: &TableRun| {
         let known = |row: &[f64]| columns.iter().all(|column| !row[*column].is_nan());
-        let first = table
-            .rows(run)
-            .position(known)
-            .unwrap_or(run.rows.len() / width);
-        TableRun {
-            name: run.name.clone(),
-            rows: run.rows.get(first * width..).unwrap_or_default().to_vec(),
-            first_line: run.line(first).unwrap_or(0),
-            lines: run.lines.get(first..).unwrap_or_default().to_vec(),
-        }
+        let count = run.rows.len() / width;
+        let first = table.rows(run).position(known).unwrap_or(count);
+        run.part(first..count, width)
     };
     runs.iter().map(from_first).collect()
 }

@@ -70,28 +70,18 @@ fn together(faults: Vec<(String, Fault)>, count: usize) -> Vec<Fault> {
 
 /// The runs of an experiment have its label, and begin and end where one of its columns has a value.
 pub(super) fn cut(table: &Table, plan: &Plan, runs: &mut Vec<TableRun>, label: &str) {
-    let inputs = plan
-        .inputs
-        .iter()
-        .filter_map(|(link, _)| Some(link.as_ref()?.column));
     let measured = plan.measured.iter().map(|(link, _)| link.column);
-    let columns: Vec<usize> = inputs.chain(measured).collect();
+    let columns: Vec<usize> = plan.input_columns().chain(measured).collect();
     let width = table.columns.len().max(1);
     for run in runs.iter_mut() {
-        run.name = format!("{label} {}", run.name).trim().to_owned();
         let there = |row: &[f64]| {
             let value = columns.iter().any(|column| !row[*column].is_nan());
             value && !row[plan.time.column].is_nan()
         };
         let first = table.rows(run).position(there).unwrap_or(0);
         let last = table.rows(run).rposition(there).map_or(first, |at| at + 1);
-        run.first_line = run.line(first).unwrap_or(0);
-        run.lines = run.lines.get(first..last).unwrap_or_default().to_vec();
-        run.rows = run
-            .rows
-            .get(first * width..last * width)
-            .unwrap_or_default()
-            .to_vec();
+        *run = run.part(first..last, width);
+        run.name = format!("{label} {}", run.name).trim().to_owned();
     }
     runs.retain(|run| !run.rows.is_empty());
 }

@@ -77,17 +77,9 @@ fn remove_abandoned(prefix: &str, folder: &Path) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::names;
     use super::super::{OutputFile, save};
     use super::*;
-
-    fn left(folder: &Path) -> Vec<String> {
-        let entries = folder.read_dir().unwrap();
-        let mut names: Vec<_> = entries
-            .map(|e| e.unwrap().file_name().into_string().unwrap())
-            .collect();
-        names.sort();
-        names
-    }
 
     #[test]
     fn what_a_killed_program_left_is_removed_and_what_lives_stays() {
@@ -115,12 +107,12 @@ mod tests {
             "a.csv",
         ]);
         stays.sort_unstable();
-        assert_eq!(left(folder.path()), stays);
+        assert_eq!(names(folder.path()), stays);
         // It is killed as well.
         drop(living);
         save(&at("a.csv"), b"whole").unwrap();
         stays.retain(|name| !name.contains("bbbbbb"));
-        assert_eq!(left(folder.path()), stays);
+        assert_eq!(names(folder.path()), stays);
     }
 
     #[cfg(unix)]
@@ -152,7 +144,7 @@ mod tests {
             }
         });
         assert_eq!(std::fs::read(&path).unwrap(), b"whole");
-        assert_eq!(left(folder.path()), ["a.csv"]);
+        assert_eq!(names(folder.path()), ["a.csv"]);
     }
 
     #[test]
@@ -163,6 +155,6 @@ mod tests {
             let file = OutputFile::create(&path).unwrap();
             assert!(file.finish().is_ok(), "{name}");
         }
-        assert_eq!(left(folder.path()).len(), 2);
+        assert_eq!(names(folder.path()).len(), 2);
     }
 }

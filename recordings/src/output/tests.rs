@@ -1,10 +1,13 @@
 use super::*;
 
-fn names(folder: &Path) -> Vec<String> {
+/// What is in a folder, in order.
+pub(super) fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
-    entries
+    let mut names: Vec<String> = entries
         .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
-        .collect()
+        .collect();
+    names.sort();
+    names
 }
 
 #[test]

@@ -19,23 +19,14 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::Criterion;
-use loopsight_core::{Estimator, Real};
+use loopsight_core::{Estimator, Plant, Real};
 use loopsight_estimators::{Rls, RlsSettings};
 use loopsight_model::model::Model;
 use loopsight_model::simulate::Simulator;
-use loopsight_plants as _;
+use loopsight_plants::Ddmr;
 use nalgebra::{DVector, SVector};
 
-const PAPER: &str = "[plant.ddmr]
-K_A = -15.146
-K_B = 0.005
-K_C = 0.136
-K_D = -9.573
-K_E = -3.945
-K_F = 0.656
-half_track = 0.131
-wheel_radius = 0.05
-";
+const PAPER: &str = <Ddmr as Plant>::META.example;
 
 const FORGETTING: f64 = 0.99;
 const LIMIT: f64 = 1e6;

@@ -2,7 +2,7 @@
 //! differ, the input counts as one that panics.
 
 use loopsight_controllers::FeedbackLinearizingPi;
-use loopsight_core::Loop;
+use loopsight_core::{Loop, Plant};
 use loopsight_estimators::Rls;
 use loopsight_link::{Configuration, Hello, LONGEST, Measured, Reply, Request, VERSION, encode};
 use loopsight_model::model::Model;
@@ -15,17 +15,8 @@ use nalgebra::Const;
 
 use crate::targets::{SESSION, Take, configuration, list};
 
-/// The Twil of `examples/twil` with friction, by the library's parts.
-const RUST: &str = "[plant.ddmr]
-K_A = -15.146
-K_B = 0.005
-K_C = 0.136
-K_D = -9.573
-K_E = -3.945
-K_F = 0.656
-half_track = 0.131
-wheel_radius = 0.05
-[[effect]]
+/// What the Twil has beside its plant: friction at one wheel, and two sensors.
+const FRICTION: &str = "[[effect]]
 [effect.coulomb_friction]
 at = [\"wheel.right\"]
 level = 0.9
@@ -34,7 +25,7 @@ width = 0.3
 [log.measured.angular_velocity]
 ";
 
-/// The same equations, written as expressions.
+/// The same equations as the library's parts, written as expressions.
 const EXPRESSIONS: &str = "[plant.expression.states]
 v = { unit = \"m/s\", rate = \"K_A * v + K_B * w * w + K_C * (r + right + l)\" }
 w = { unit = \"rad/s\", rate = \"K_D * w + K_E * v * w + K_F * (r + right - l)\" }
@@ -104,7 +95,8 @@ fn number<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
 /// Both are driven for three periods, and are at the same place, digit for digit, or both nowhere.
 pub(crate) fn expression_and_rust() -> Take {
     let made = |text: &str| Model::from_toml("twin.toml", text).unwrap().0;
-    let models = [made(RUST), made(EXPRESSIONS)];
+    let rust = format!("{}{FRICTION}", <Ddmr as Plant>::META.example);
+    let models = [made(&rust), made(EXPRESSIONS)];
     assert!(models.iter().all(|m| m.parameters.len() == PARAMETERS));
     let values = models.each_ref().map(Model::values);
     assert_eq!(values[0], values[1]);
