@@ -38,6 +38,15 @@ pub enum PartRole {
 }
 
 impl PartRole {
+    /// All of them.
+    pub const ALL: [PartRole; 5] = [
+        PartRole::Plant,
+        PartRole::Effect,
+        PartRole::Estimator,
+        PartRole::Controller,
+        PartRole::Driver,
+    ];
+
     /// The role as it is written.
     pub fn name(self) -> &'static str {
         match self {

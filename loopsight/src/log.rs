@@ -143,6 +143,24 @@ impl Log {
         table.runs.iter().map(|run| run.rows.len() / width).sum()
     }
 
+    /// The values of a column, by its name in [`Log::columns`]: those of all runs, one after another. `NaN` where
+    /// there is no sample, `None` where there is no such column.
+    ///
+    /// ```
+    /// let log = loopsight::Log::from_bytes("motor.csv", b"time_s,speed_rpm\n0.0,0\n0.5,30\n")?;
+    /// assert_eq!(log.column("speed_rpm"), Some(vec![0.0, 30.0]));
+    /// # Ok::<(), loopsight::Error>(())
+    /// ```
+    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let table = self.source.table();
+        let at = table.columns.iter().position(|c| c.text == name)?;
+        let rows = table
+            .runs
+            .iter()
+            .flat_map(|run| run.rows.chunks_exact(table.columns.len()));
+        Some(rows.map(|row| row[at]).collect())
+    }
+
     /// The rows `rows` of the log, counted from 0 over all its runs: to fit to one part and judge on another.
     /// A part of a log that describes itself does so no more.
     #[must_use]

@@ -127,6 +127,11 @@ impl Model {
         &self.composed.name
     }
 
+    /// The file, or the name under which the text was handed over.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
     /// Id of the plant.
     pub fn plant(&self) -> &'static str {
         self.composed.plant.id

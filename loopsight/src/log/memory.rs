@@ -25,8 +25,7 @@ struct Rows {
 
 #[derive(Clone, Debug)]
 struct Named {
-    name: String,
-    unit: String,
+    name: ColumnName,
     values: Vec<f64>,
 }
 
@@ -49,16 +48,28 @@ impl LogBuilder {
 
     /// A column of the present run: a name, its unit (`1` for a plain number), a value for each row;
     /// `NaN` where there is none. One of them is `time`.
-    pub fn column(mut self, name: &str, unit: &str, values: impl Into<Vec<f64>>) -> Self {
+    pub fn column(self, name: &str, unit: &str, values: impl Into<Vec<f64>>) -> Self {
+        let unit = unit.trim();
+        let name = ColumnName {
+            text: column(name, unit),
+            name: name.to_owned(),
+            unit: Some(unit.to_owned()),
+        };
+        self.push(name, values.into())
+    }
+
+    /// A column whose name says its unit at its end, as in a file: `voltage_right_V`, `speed_rpm`. A name
+    /// without one is in SI units.
+    pub fn header(self, text: &str, values: impl Into<Vec<f64>>) -> Self {
+        self.push(ColumnName::new(text), values.into())
+    }
+
+    fn push(mut self, name: ColumnName, values: Vec<f64>) -> Self {
         if self.runs.is_empty() {
             self.runs.push(Rows::default());
         }
         if let Some(run) = self.runs.last_mut() {
-            run.columns.push(Named {
-                name: name.to_owned(),
-                unit: unit.trim().to_owned(),
-                values: values.into(),
-            });
+            run.columns.push(Named { name, values });
         }
         self
     }
@@ -75,15 +86,16 @@ impl LogBuilder {
             return Err(wrong("the log has no column".to_owned()));
         };
         for (i, named) in first.columns.iter().enumerate() {
-            if first.columns[..i].iter().any(|c| c.name == named.name) {
-                return Err(wrong(format!("two columns are named `{}`", named.name)));
+            let (name, written) = (&named.name.name, named.name.unit.as_deref());
+            if first.columns[..i].iter().any(|c| c.name.name == *name) {
+                return Err(wrong(format!("two columns are named `{name}`")));
             }
-            if let Err(error) = unit::parse(&named.unit) {
+            if let Some(written) = written
+                && let Err(error) = unit::parse(written)
+            {
                 return Err(wrong(format!(
-                    "column `{}`: `{}` is not a unit: at `{}`: {error}",
-                    named.name,
-                    named.unit,
-                    error.piece(&named.unit)
+                    "column `{name}`: `{written}` is not a unit: at `{}`: {error}",
+                    error.piece(written)
                 )));
             }
         }
@@ -94,11 +106,10 @@ impl LogBuilder {
             } else {
                 format!(" of run `{}`", run.name)
             };
-            let header = |run: &Rows| -> Vec<(String, String)> {
-                let columns = run.columns.iter();
-                columns.map(|c| (c.name.clone(), c.unit.clone())).collect()
+            let names = |run: &Rows| -> Vec<ColumnName> {
+                run.columns.iter().map(|c| c.name.clone()).collect()
             };
-            if header(run) != header(first) {
+            if names(run) != names(first) {
                 return Err(wrong(format!(
                     "the columns{of} are not those of the first run"
                 )));
@@ -107,9 +118,9 @@ impl LogBuilder {
             if let Some(other) = run.columns.iter().find(|c| c.values.len() != rows) {
                 return Err(wrong(format!(
                     "column `{}`{of} has {} values, column `{}` has {rows}",
-                    other.name,
+                    other.name.name,
                     other.values.len(),
-                    run.columns[0].name
+                    run.columns[0].name.name
                 )));
             }
             runs.push(TableRun {
@@ -124,11 +135,7 @@ impl LogBuilder {
         if runs.iter().all(|run| run.rows.is_empty()) {
             return Err(wrong("the log has no row".to_owned()));
         }
-        let columns = first.columns.iter().map(|c| ColumnName {
-            text: column(&c.name, &c.unit),
-            name: c.name.clone(),
-            unit: Some(c.unit.clone()),
-        });
+        let columns = first.columns.iter().map(|c| c.name.clone());
         Ok(Log::of_table(Table {
             columns: columns.collect(),
             runs,
@@ -141,6 +148,19 @@ impl LogBuilder {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_header_says_its_unit_as_in_a_file() {
+        let log = Log::in_memory("bench")
+            .header("time_s", [0.0, 0.1])
+            .header("speed_rpm", [0.0, 60.0])
+            .column("voltage", "V", [0.0, 6.0])
+            .build()
+            .unwrap();
+        assert_eq!(log.columns(), ["time_s", "speed_rpm", "voltage_V"]);
+        assert_eq!(log.column("voltage_V"), Some(vec![0.0, 6.0]));
+        assert_eq!(log.column("voltage"), None);
+    }
 
     #[test]
     fn what_does_not_fit_together_is_refused_with_its_name() {

@@ -1,0 +1,47 @@
+"""Progress of long work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+Progress = bool | Callable[[str, int, int], object]
+Report = Callable[[str, int, int], object]
+
+
+@contextmanager
+def reporting(progress: Progress) -> Iterator[Report | None]:
+    """What gets stage, done and total: a bar of tqdm for ``True``, nobody for ``False``."""
+    if progress is False or progress is None:
+        yield None
+    elif progress is True:
+        with _bars() as report:
+            yield report
+    else:
+        yield progress
+
+
+@contextmanager
+def _bars() -> Iterator[Report]:
+    try:
+        from tqdm.auto import tqdm
+    except ImportError as missing:
+        raise ImportError("progress bars need the package tqdm: pip install tqdm") from missing
+    bar: Any = None
+
+    def report(stage: str, done: int, total: int) -> None:
+        nonlocal bar
+        if bar is None or bar.desc != f"{stage}: ":
+            if bar is not None:
+                bar.close()
+            bar = tqdm(total=total, leave=False)
+            bar.set_description(stage)
+        bar.total = total
+        bar.update(done - bar.n)
+
+    try:
+        yield report
+    finally:
+        if bar is not None:
+            bar.close()

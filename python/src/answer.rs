@@ -1,0 +1,222 @@
+//! What the engine answers, of whatever kind.
+
+use loopsight::answers::{
+    AddAnswer, CompareAnswer, DiagnoseAnswer, ExperimentAnswer, FitAnswer, ImproveAnswer,
+    RunAnswer, Series, SeriesOf, SimulateAnswer,
+};
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::error::{raised, refused};
+use crate::log::Log;
+use crate::model::Model;
+
+/// Makes the page of an answer; the argument stands at its foot.
+type Page = dyn Fn(&str) -> String + Send + Sync;
+
+/// An answer: its JSON, and what else came with it.
+#[pyclass(frozen, module = "loopsight._engine")]
+pub struct Answer {
+    json: String,
+    model: Option<loopsight::Model>,
+    log: Option<loopsight::Log>,
+    series: Vec<Series>,
+    page: Option<Box<Page>>,
+}
+
+#[pymethods]
+impl Answer {
+    /// Exactly what the command prints with ``--json``.
+    fn to_json(&self) -> &str {
+        &self.json
+    }
+
+    /// The model that came of it.
+    #[getter]
+    fn model(&self) -> Option<Model> {
+        self.model.clone().map(Model)
+    }
+
+    /// The log that came of it.
+    #[getter]
+    fn log(&self) -> Option<Log> {
+        self.log.clone().map(Log)
+    }
+
+    /// What was measured and what the model says: of which model, run, signal, unit, and the arrays `time_s`,
+    /// `measured`, `model`, `residual`, `one_step`.
+    fn series<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let array = |values: &[f64]| PyArray1::from_slice(py, values);
+        let of = self.series.iter().map(|series| {
+            let row = PyDict::new(py);
+            let of = match series.of {
+                SeriesOf::Model => "model",
+                SeriesOf::Fitted => "fitted",
+                SeriesOf::Nominal => "nominal",
+                SeriesOf::Best => "best",
+                _ => "other",
+            };
+            row.set_item("of", of)?;
+            row.set_item("run", &series.run)?;
+            row.set_item("signal", &series.signal)?;
+            row.set_item("unit", &series.unit)?;
+            row.set_item("time_s", array(&series.time_s))?;
+            row.set_item("measured", array(&series.measured))?;
+            row.set_item("model", array(&series.model))?;
+            row.set_item("residual", array(&series.residual))?;
+            row.set_item("one_step", array(&series.one_step))?;
+            Ok(row)
+        });
+        of.collect()
+    }
+
+    /// Whether there is a page with pictures.
+    #[getter]
+    fn has_page(&self) -> bool {
+        self.page.is_some()
+    }
+
+    /// A page with pictures (HTML) that opens offline; `command` stands at its foot.
+    #[pyo3(signature = (command=""))]
+    fn page(&self, py: Python<'_>, command: &str) -> PyResult<String> {
+        match &self.page {
+            Some(page) => Ok(py.detach(|| page(command))),
+            None => Err(refused(py, "this answer has no page")),
+        }
+    }
+}
+
+impl Answer {
+    /// An answer of numbers and words alone.
+    pub(crate) fn plain(answer: &impl loopsight::Answer) -> loopsight::Result<Self> {
+        Ok(Self {
+            json: answer.to_json()?,
+            model: None,
+            log: None,
+            series: Vec::new(),
+            page: None,
+        })
+    }
+
+    fn with_model(self, model: Option<&loopsight::Model>) -> Self {
+        Self {
+            model: model.cloned(),
+            ..self
+        }
+    }
+
+    fn with_log(self, log: loopsight::Log) -> Self {
+        Self {
+            log: Some(log),
+            ..self
+        }
+    }
+
+    fn with_series(self, series: Option<Vec<Series>>) -> Self {
+        Self {
+            series: series.unwrap_or_default(),
+            ..self
+        }
+    }
+
+    fn with_page(self, page: impl Fn(&str) -> String + Send + Sync + 'static) -> Self {
+        Self {
+            page: Some(Box::new(page)),
+            ..self
+        }
+    }
+}
+
+/// What an answer of the library becomes here. `series`: its JSON has the series, too; for pictures they are
+/// kept in any case.
+pub(crate) trait IntoAnswer {
+    fn into_answer(self, series: bool) -> loopsight::Result<Answer>;
+}
+
+/// The series of an answer, which leave it where its JSON is not to have them.
+fn taken(of: &mut Option<Vec<Series>>, keep: bool) -> Option<Vec<Series>> {
+    if keep { of.clone() } else { of.take() }
+}
+
+impl IntoAnswer for CompareAnswer {
+    fn into_answer(mut self, series: bool) -> loopsight::Result<Answer> {
+        let series = taken(&mut self.series, series);
+        Ok(Answer::plain(&self)?
+            .with_series(series)
+            .with_page(move |command| self.page(command)))
+    }
+}
+
+impl IntoAnswer for FitAnswer {
+    fn into_answer(mut self, series: bool) -> loopsight::Result<Answer> {
+        let series = taken(&mut self.series, series);
+        let plain = Answer::plain(&self)?.with_model(Some(self.model()));
+        Ok(plain
+            .with_series(series)
+            .with_page(move |command| self.page(command)))
+    }
+}
+
+impl IntoAnswer for DiagnoseAnswer {
+    fn into_answer(mut self, series: bool) -> loopsight::Result<Answer> {
+        let series = taken(&mut self.series, series);
+        Ok(Answer::plain(&self)?
+            .with_series(series)
+            .with_page(move |command| self.page(command)))
+    }
+}
+
+impl IntoAnswer for ImproveAnswer {
+    fn into_answer(mut self, series: bool) -> loopsight::Result<Answer> {
+        let series = taken(&mut self.series, series);
+        let plain = Answer::plain(&self)?.with_model(self.model());
+        Ok(plain
+            .with_series(series)
+            .with_page(move |command| self.page(command)))
+    }
+}
+
+impl IntoAnswer for RunAnswer {
+    fn into_answer(self, _: bool) -> loopsight::Result<Answer> {
+        Ok(Answer::plain(&self)?.with_page(move |command| self.page(command)))
+    }
+}
+
+impl IntoAnswer for AddAnswer {
+    fn into_answer(self, _: bool) -> loopsight::Result<Answer> {
+        Ok(Answer::plain(&self)?.with_model(Some(self.model())))
+    }
+}
+
+impl IntoAnswer for SimulateAnswer {
+    fn into_answer(self, _: bool) -> loopsight::Result<Answer> {
+        Ok(Answer::plain(&self)?.with_log(self.log().clone()))
+    }
+}
+
+impl IntoAnswer for ExperimentAnswer {
+    fn into_answer(self, _: bool) -> loopsight::Result<Answer> {
+        let plain = Answer::plain(&self)?;
+        if !self.answers() {
+            return Ok(plain);
+        }
+        let time = self.time_s().to_vec();
+        let mut inputs = loopsight::Log::in_memory("the plan").column("time", "s", time);
+        for (name, unit, values) in self.inputs() {
+            inputs = inputs.column(name, unit, values);
+        }
+        Ok(plain.with_log(inputs.build()?))
+    }
+}
+
+/// An answer of the library as Python gets it.
+pub(crate) fn answered<A: IntoAnswer>(
+    py: Python<'_>,
+    answer: loopsight::Result<A>,
+    series: bool,
+) -> PyResult<Answer> {
+    answer
+        .and_then(|answer| answer.into_answer(series))
+        .map_err(|error| raised(py, &error))
+}
