@@ -84,6 +84,7 @@ fn separating(a: &str, b: &str) -> String {
         "coulomb_friction",
         "stribeck_friction",
         "input_saturation",
+        "input_power",
         "gain_asymmetry",
     ]) {
         "several levels of the input, slow ramps through zero in both directions, and coasting from speed with the input at zero".to_owned()

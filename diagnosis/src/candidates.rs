@@ -210,12 +210,43 @@ pub(crate) fn candidates(
     found
 }
 
-/// Sets the smoothing width of the last effect of `model` to `sign_width` times the flow in the recording.
-/// Returns the root mean square of the flow at its channels.
+/// Sets the smoothing width of the last effect of `model` to `sign_width` times the flow in the recording, and
+/// the command that its sizes refer to. Returns the root mean square of the flow at its channels.
 pub(crate) fn suit(model: &mut Model, rms: &[f64], sign_width: f64) -> f64 {
     let flow = model.effects.last().map_or(0.0, |e| flow(model, e, rms));
     smooth(model, 1, sign_width * flow);
+    refer(model, rms);
     flow
+}
+
+/// Sets what the last effect of `model` refers its commands to: the root mean square of the recording's, to two
+/// digits. The plant's gain keeps its value there, and depends least on the effect.
+fn refer(model: &mut Model, rms: &[f64]) {
+    let Some(effect) = model.effects.last() else {
+        return;
+    };
+    let command = |c: &&'static Channel| match c.place {
+        Place::Input(i) => model.plant.inputs.get(i),
+        _ => None,
+    };
+    let largest = (effect.at.iter().filter_map(command))
+        .filter_map(|input| rms.get(model.find_signal(input.id).ok()?).copied())
+        .fold(0.0, f64::max);
+    let first = effect.first_parameter;
+    let references: Vec<usize> = (effect.meta.parameters.iter().enumerate())
+        .filter(|(_, declaration)| is_reference(declaration))
+        .map(|(i, _)| first + i)
+        .collect();
+    if largest.is_normal() {
+        for i in references {
+            model.parameters[i].value = format!("{largest:.1e}").parse().ok();
+        }
+    }
+}
+
+/// Whether a parameter is a value of the channel that the effect refers to, and no fit finds.
+fn is_reference(declaration: &Parameter) -> bool {
+    declaration.unit == "channel" && !declaration.estimated
 }
 
 /// Root mean square of the flow at an effect's channels; 0 where there is none.

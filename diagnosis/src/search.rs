@@ -223,7 +223,7 @@ impl Search<'_> {
 }
 
 /// Whether an effect has any size: a parameter whose neutral value is zero is above the share `least` of its
-/// noticeable size.
+/// noticeable size. Where it has none, any parameter must be as far from its neutral value.
 fn does_something(explanation: &Explanation, least: f64) -> bool {
     let model = &explanation.model;
     let place = &explanation.place;
@@ -234,15 +234,20 @@ fn does_something(explanation: &Explanation, least: f64) -> bool {
                 .iter()
                 .all(|c| place.at.iter().any(|at| at == c.id))
     });
-    let mut sizes = own
+    let free: Vec<_> = own
         .flat_map(|effect| {
             let parameters = model.parameters.iter().skip(effect.first_parameter);
             parameters.take(effect.meta.parameters.len())
         })
-        .filter(|p| p.free && p.declaration.default == Some(0.0))
-        .peekable();
-    // An effect without such a parameter always counts as having a size.
-    sizes.peek().is_none() || sizes.any(|p| p.value.is_some_and(|v| v.abs() > least * p.scale()))
+        .filter(|p| p.free)
+        .collect();
+    let has_size = free.iter().any(|p| p.declaration.default == Some(0.0));
+    free.iter()
+        .filter(|p| !has_size || p.declaration.default == Some(0.0))
+        .any(|p| {
+            let away = p.value.zip(p.declaration.default);
+            away.is_none_or(|(value, neutral)| (value - neutral).abs() > least * p.scale())
+        })
 }
 
 /// The least error among some candidates.

@@ -2,12 +2,13 @@
 
 use crate::delay::Delay;
 
-/// What an amplifier does to a command, in this order: transport delay, filter, dead zone, limit,
-/// gain and offset.
+/// What an amplifier does to a command, in this order: transport delay, filter, dead zone, throttle curve,
+/// limit, gain and offset.
 ///
 /// ```text
 /// u1(t) = command(t - delay)     lag u2' = u1 - u2
-/// u3 = u2 -/+ dead_zone beyond ±dead_zone, 0 within     V = gain clamp(u3, ±limit) + offset
+/// u3 = u2 -/+ dead_zone beyond ±dead_zone, 0 within     u4 = full sign(u3) |u3/full|^exponent
+/// V = gain clamp(u4, ±limit) + offset
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AmplifierParts {
@@ -17,6 +18,10 @@ pub(crate) struct AmplifierParts {
     pub(crate) lag: f64,
     /// Voltage below which nothing comes out, and which is missing above, V.
     pub(crate) dead_zone: f64,
+    /// Of the throttle curve; 1: a straight line.
+    pub(crate) exponent: f64,
+    /// The command that the throttle curve passes on as it is, V.
+    pub(crate) full: f64,
     /// Largest voltage, V.
     pub(crate) limit: f64,
     /// Gain.
@@ -31,6 +36,8 @@ impl Default for AmplifierParts {
             delay: 0.0,
             lag: 0.0,
             dead_zone: 0.0,
+            exponent: 1.0,
+            full: 1.0,
             limit: f64::INFINITY,
             gain: 1.0,
             offset: 0.0,
@@ -76,7 +83,12 @@ impl Amplifier {
         let live = (filtered.abs() - parts.dead_zone)
             .max(0.0)
             .copysign(filtered);
-        parts.gain * live.clamp(-parts.limit, parts.limit) + parts.offset
+        let curved = if parts.exponent == 1.0 {
+            live
+        } else {
+            (parts.full * (live.abs() / parts.full).powf(parts.exponent)).copysign(live)
+        };
+        parts.gain * curved.clamp(-parts.limit, parts.limit) + parts.offset
     }
 }
 
@@ -109,6 +121,19 @@ mod tests {
             [0.5, -3.0, 9.0].map(|v| dead.step(v)),
             [0.5, -3.5, 12.5],
             "within the zone, below it, beyond the limit"
+        );
+        let mut curved = Amplifier::new(
+            AmplifierParts {
+                exponent: 2.0,
+                full: 12.0,
+                ..AmplifierParts::default()
+            },
+            1e-3,
+        );
+        assert_eq!(
+            [0.0, 6.0, -6.0, 12.0].map(|v| curved.step(v)),
+            [0.0, 3.0, -3.0, 12.0],
+            "a quarter of the voltage at half the command"
         );
         let mut slow = Amplifier::new(
             AmplifierParts {

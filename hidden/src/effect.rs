@@ -67,6 +67,7 @@ effects! {
     WheelSlip "wheel_slip" Twil "tyres on a slippery floor; odometry from undriven measuring wheels",
     DeadZone "dead_zone" Twil "amplifiers that do nothing below a threshold",
     InputSaturation "input_saturation" Twil "amplifiers that stop below the commanded 9 V",
+    InputPower "input_power" Twil "speed controllers whose voltage goes with a power of the command",
     InputDelay "input_delay" Twil "commands that take effect late",
     ActuatorLag "actuator_lag" Twil "a filter before both amplifiers",
     InputOffset "input_offset" Twil "a bias on the right amplifier",

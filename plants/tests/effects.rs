@@ -160,6 +160,9 @@ fn noticeable(model: &Model, own: std::ops::Range<usize>) -> Vec<f64> {
                 "{}",
                 parameter.name
             );
+        } else if parameter.declaration.id == "reference" {
+            // About the commands: the square of many volts would be too many.
+            values[i] = 6.0;
         }
     }
     values

@@ -39,7 +39,11 @@ fn judge(log: &Recording, test: Option<&Recording>) -> Diagnosis {
 }
 
 fn finds(effect: Hidden, size: f64, seed: u64) {
-    let recording = log(&[(effect, size)], Experiment::Prbs, seed);
+    finds_under(Experiment::Prbs, effect, size, seed);
+}
+
+fn finds_under(kind: Experiment, effect: Hidden, size: f64, seed: u64) {
+    let recording = log(&[(effect, size)], kind, seed);
     let unseen = log(&[(effect, size)], Experiment::MultiLevel, 100 + seed);
     let diagnosis = judge(&recording, Some(&unseen));
     assert_eq!(
@@ -98,6 +102,12 @@ fn a_late_sensor_is_a_class_with_a_late_command() {
 fn a_stronger_motor_and_an_eccentric_encoder_are_found() {
     finds(Hidden::GainAsymmetry, 1.0, 3);
     finds(Hidden::EncoderRipple, 1.0, 3);
+}
+
+/// Two levels do not show it: the log has chirp and ramps as well.
+#[test]
+fn a_power_law_is_found_with_its_exponent() {
+    finds_under(Experiment::Mixed, Hidden::InputPower, 1.0, 7);
 }
 
 /// A dead zone of the driver cannot lie behind the terminals of a motor: where the voltages were measured

@@ -267,6 +267,7 @@ fn every_effect_of_the_library_can_stand_in_a_loop() {
         | "battery_sag"
         | "gain_asymmetry"
         | "input_offset"
+        | "input_power"
         | "input_saturation"
         | "winding_heating"
         | "centrifugal_offset" => Some("compensated"),

@@ -32,6 +32,18 @@ pub(super) fn saturation(m: &mut Physics, mut of: Concealed) -> Concealed {
     of.fitted("limit", limit, "V")
 }
 
+/// Speed controllers with a throttle curve: of the battery's 12 V they give the commanded share to the power 1.5.
+pub(super) fn power(m: &mut Physics, mut of: Concealed) -> Concealed {
+    let exponent = 1.0 + 0.5 * of.size;
+    let full = m.battery.open_circuit;
+    each(m, &mut of, |a| {
+        a.exponent = exponent;
+        a.full = full;
+    });
+    of.fitted("exponent", exponent, "1")
+        .physical("full_command", full, "V")
+}
+
 /// 30 ms late.
 pub(super) fn delay(m: &mut Physics, mut of: Concealed) -> Concealed {
     let delay = 0.03 * of.size;

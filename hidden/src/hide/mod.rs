@@ -51,6 +51,7 @@ pub(crate) fn hide(
         H::PayloadChange => body::payload(machine, concealed),
         H::DeadZone => input::dead_zone(machine, concealed),
         H::InputSaturation => input::saturation(machine, concealed),
+        H::InputPower => input::power(machine, concealed),
         H::InputDelay => input::delay(machine, concealed),
         H::ActuatorLag => input::lag(machine, concealed),
         H::InputOffset => input::offset(machine, concealed),

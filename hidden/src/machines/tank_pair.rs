@@ -11,7 +11,7 @@ pub(crate) const SHEET: Sheet = Sheet {
     inputs: 1,
     columns: &["time_s", "pump_V", "level_upper_m", "level_lower_m"],
     command: [4.4, 4.0],
-    shows: &[Hidden::DeadZone, Hidden::ConstantForce],
+    shows: &[Hidden::DeadZone, Hidden::InputPower, Hidden::ConstantForce],
     build: |phase, _| Box::new(TankPair::new(phase)),
 };
 
@@ -22,6 +22,9 @@ const STEPS: usize = 100;
 const RESOLUTION: f64 = 1.0 / 4096.0;
 /// Both tanks at the start, m.
 const START: f64 = 0.15;
+
+/// Voltage at which the pump moves what its data sheet says, V.
+const RATED: f64 = 6.0;
 
 /// Two tanks with holes in their bottoms; what leaves the upper one falls into the lower one.
 ///
@@ -41,6 +44,8 @@ pub(super) struct TankPair {
     pump: f64,
     /// Voltage below which the pump does not turn, V.
     threshold: f64,
+    /// Its flow goes with this power of the voltage.
+    exponent: f64,
     /// What a dosing pump draws from the lower tank, m³/s.
     drawn: f64,
     sensors: [Scale; 2],
@@ -57,6 +62,7 @@ impl TankPair {
             hole: [3.0e-5, 2.8e-5],
             pump: 1.2e-5,
             threshold: 0.0,
+            exponent: 1.0,
             drawn: 0.0,
             sensors: phase.map(|p| Scale::new(RESOLUTION, p)),
             volume: area.map(|a| a * START),
@@ -66,7 +72,13 @@ impl TankPair {
 
     /// What the pump moves, m³/s.
     fn inflow(&self) -> f64 {
-        self.pump * (self.voltage - self.threshold).max(0.0)
+        let live = (self.voltage - self.threshold).max(0.0);
+        let curved = if self.exponent == 1.0 {
+            live
+        } else {
+            RATED * (live / RATED).powf(self.exponent)
+        };
+        self.pump * curved
     }
 
     /// What runs out of a tank that holds `volume`, m³/s.
@@ -117,6 +129,17 @@ impl Rig for TankPair {
                 Some(
                     of.told("a pump that does not turn below a threshold", &["pump"])
                         .fitted("threshold", self.threshold, "V"),
+                )
+            }
+            Hidden::InputPower => {
+                self.exponent = 1.0 + 0.5 * of.size;
+                Some(
+                    of.told(
+                        "a pump whose flow goes with a power of its voltage",
+                        &["pump"],
+                    )
+                    .fitted("exponent", self.exponent, "1")
+                    .physical("rated_voltage", RATED, "V"),
                 )
             }
             Hidden::ConstantForce => {
