@@ -88,7 +88,7 @@ look() {
     ! grep -a 'CONSOLE' "$work/said" >&2 || complain "$name" "the console says something"
 }
 
-LOOPSIGHT_PAGES=$folder cargo test --locked -q -p loopsight-report pages_to_look_at
+LOOPSIGHT_PAGES=$folder cargo test --workspace --locked -q --lib pages_to_look_at
 pages=("$folder"/*.html)
 [ "${#pages[@]}" -ge 23 ] || complain "$folder" "there are ${#pages[@]} pages, expected at least 23"
 for page in "${pages[@]}"; do
