@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from os import PathLike
 
-from . import _engine
+from . import _engine, fleet
 from ._error import Error
 from ._log import Log
 from ._model import Model, Parameter
@@ -52,6 +52,7 @@ __all__ = [
     "experiment",
     "explain",
     "fit",
+    "fleet",
     "improve",
     "inspect",
     "parts",

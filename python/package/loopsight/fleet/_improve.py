@@ -1,0 +1,246 @@
+"""Every log of a fleet improved, one task a log."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from .._error import Error
+from .._model import Model
+from .._session import improve as improve_one
+from ._engines import cores, engine_named
+
+#: What tells one log of a fleet from another.
+KEY = ("robot", "time", "path")
+#: Rows that come before the table of results is written anew.
+ROWS = 200
+
+
+def improve(
+    table: Any,
+    model: Model | str | PathLike[str],
+    *,
+    out: str | PathLike[str],
+    engine: str | None = None,
+    workers: int | None = None,
+    retries: int = 2,
+    progress: bool = False,
+) -> Any:
+    """Improves the model with each log of a fleet.
+
+    A log that is broken is a row with its fault, never the end of the job. Results are safe on the disk as they
+    come: in `out` and in a journal beside it. A job that was stopped or killed goes on where it was when it is
+    begun again with the same `out`.
+
+    Parameters
+    ----------
+    table : pandas data frame or path
+        A row for each log: ``path``, and if there are such columns ``robot`` and ``time``. A path is one of a
+        Parquet or CSV file; logs are looked for beside it.
+    model : Model or path
+        The model of these robots.
+    out : path
+        The Parquet file with the results.
+    engine : {"ray", "dask", "processes"}, optional
+        What runs the tasks: by default the first of these that is installed.
+    workers : int, optional
+        How many work at once: by default as many as there are processors.
+    retries : int
+        How often a log is tried again whose worker died.
+    progress : bool
+        Whether a bar is shown (tqdm).
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row for each log: ``robot``, ``time``, ``path``; ``status`` (``done`` or ``fault``), ``fault``;
+        ``verdict``, ``summary``; ``nrmse_before``, ``nrmse_after`` (free run on validation data, as a share of the
+        standard deviation); ``effects`` (``effect@channel+channel``, separated by ``; ``); ``parameters`` (JSON:
+        value, unit, standard error, interval and verdict of each); ``seconds`` that it took.
+    """
+    pandas = _pandas()
+    rows = _tasks(pandas, table)
+    known = model if isinstance(model, Model) else Model.from_file(model)
+    target = Path(fspath(out))
+    journal = target.with_name(target.name + ".journal")
+    found = _before(pandas, target, journal)
+    text, name = known.to_toml(), known._engine.file
+    pending = [row for row in rows if _key(row) not in found]
+    tasks = [{"row": row, "toml": text, "model": name} for row in pending]
+    run = engine_named(engine)
+    with journal.open("a", encoding="utf-8") as log, _bar(progress, len(rows), len(found)) as bar:
+        results = run(_task, tasks, workers or cores(), retries)
+        for count, (at, row) in enumerate(results, start=1):
+            if isinstance(row, str):
+                row = {**pending[at], "status": "fault", "fault": row}
+            found[_key(row)] = row
+            log.write(json.dumps(row) + "\n")
+            log.flush()
+            os.fsync(log.fileno())
+            bar.update(1)
+            if count % ROWS == 0:
+                _write(pandas, target, found)
+                log.truncate(0)
+    _write(pandas, target, found)
+    journal.unlink(missing_ok=True)
+    return pandas.read_parquet(target)
+
+
+def effects(results: Any) -> Any:
+    """Which robots lack which effect: a table of robots and effects with the share of each robot's good logs.
+
+    Parameters
+    ----------
+    results : pandas data frame or path
+        What `improve` found.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Indexed by robot: ``logs``, ``faults``, and a column for each ``effect@channel`` with a share from 0 to 1.
+    """
+    pandas = _pandas()
+    if isinstance(results, (str, PathLike)):
+        results = pandas.read_parquet(results)
+    rows = {}
+    for robot, logs in results.groupby("robot", sort=True):
+        good = logs[logs["status"] == "done"]
+        row: dict[str, Any] = {"logs": len(logs), "faults": len(logs) - len(good)}
+        for text in good["effects"]:
+            for effect in filter(None, text.split("; ")):
+                row[effect] = row.get(effect, 0.0) + 1.0 / len(good)
+        rows[robot] = row
+    table = pandas.DataFrame.from_dict(rows, orient="index").fillna(0.0)
+    table.index.name = "robot"
+    return table
+
+
+def _task(task: dict[str, Any]) -> dict[str, Any]:
+    """One log: a row in any case."""
+    begun = time.perf_counter()
+    row: dict[str, Any] = {**task["row"], "status": "done", "fault": None}
+    try:
+        model = Model.from_toml(task["toml"], task["model"])
+        answer = improve_one(model, task["row"]["path"]).to_dict()
+    except Error as error:
+        row |= {"status": "fault", "fault": str(error)}
+    else:
+        steps = answer["steps"]
+        added = [step["added"] for step in steps if step["added"] is not None]
+        row |= {
+            "verdict": answer["verdict"],
+            "summary": answer["summary"],
+            "nrmse_before": steps[0]["nrmse_test"] if steps else None,
+            "nrmse_after": steps[-1]["nrmse_test"] if steps else None,
+            "effects": "; ".join(f"{one['effect']}@{'+'.join(one['at'])}" for one in added),
+            "parameters": json.dumps(answer["parameters"]),
+        }
+        if not steps:
+            faults = [fault["detail"] for fault in answer["faults"]]
+            row |= {"status": "fault", "fault": "; ".join(faults) or answer["summary"]}
+    row["seconds"] = time.perf_counter() - begun
+    return row
+
+
+def _tasks(pandas: Any, table: Any) -> list[dict[str, Any]]:
+    """The rows of the table of logs, with paths that are right from here."""
+    beside = Path()
+    if isinstance(table, (str, PathLike)):
+        path = Path(fspath(table))
+        if not path.is_file():
+            raise Error(f"there is no table of logs at {path}", file=str(path))
+        beside = path.parent
+        table = pandas.read_csv(path) if path.suffix == ".csv" else pandas.read_parquet(path)
+    if "path" not in table.columns:
+        columns = ", ".join(str(column) for column in table.columns)
+        raise Error(f"the table of logs has no column `path`, found {columns}")
+    rows: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for number, record in enumerate(table.to_dict("records")):
+        path = Path(str(record["path"]))
+        robot, at = record.get("robot", path.stem), record.get("time")
+        row = {
+            "robot": str(robot),
+            "time": None if at is None or at != at else str(at),
+            "path": str(path if path.is_absolute() else beside / path),
+        }
+        if _key(row) in rows:
+            raise Error(f"row {number} of the table of logs is there twice: {path}")
+        rows[_key(row)] = row
+    return list(rows.values())
+
+
+def _key(row: dict[str, Any]) -> tuple[Any, ...]:
+    return tuple(row.get(name) for name in KEY)
+
+
+def _before(pandas: Any, target: Path, journal: Path) -> dict[tuple[Any, ...], dict[str, Any]]:
+    """What an earlier call with the same `out` has found."""
+    rows: list[dict[str, Any]] = []
+    if target.is_file():
+        for record in pandas.read_parquet(target).to_dict("records"):
+            rows.append({name: None if value != value else value for name, value in record.items()})
+    if journal.is_file():
+        for line in journal.read_text(encoding="utf-8").splitlines():
+            try:
+                rows.append(json.loads(line))
+            except json.JSONDecodeError:
+                continue  # the line that was being written when the job was killed
+        # What comes next begins on a line of its own.
+        with journal.open("a", encoding="utf-8") as log:
+            log.write("\n")
+    return {_key(row): row for row in rows}
+
+
+def _frame(pandas: Any, found: dict[tuple[Any, ...], dict[str, Any]]) -> Any:
+    texts = (*KEY, "status", "fault", "verdict", "summary", "effects", "parameters")
+    numbers = ("nrmse_before", "nrmse_after", "seconds")
+    rows = list(found.values())
+    columns: dict[str, Any] = {
+        name: pandas.Series([row.get(name) for row in rows], dtype="object") for name in texts
+    }
+    for name in numbers:
+        columns[name] = pandas.Series([row.get(name) for row in rows], dtype="float64")
+    order = [*KEY, "status", "fault", "verdict", "effects", *numbers, "parameters", "summary"]
+    return pandas.DataFrame(columns)[order].sort_values(list(KEY), ignore_index=True)
+
+
+def _write(pandas: Any, target: Path, found: dict[tuple[Any, ...], dict[str, Any]]) -> None:
+    """Writes the table of results, whole or not at all."""
+    part = target.with_name(target.name + ".part")
+    _frame(pandas, found).to_parquet(part, index=False)
+    part.replace(target)
+
+
+class _Quiet:
+    def __enter__(self) -> _Quiet:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return None
+
+    def update(self, _: int) -> None:
+        return None
+
+
+def _bar(shown: bool, total: int, done: int) -> Any:
+    if not shown:
+        return _Quiet()
+    try:
+        from tqdm.auto import tqdm
+    except ImportError as missing:
+        raise ImportError("progress bars need the package tqdm: pip install tqdm") from missing
+    return tqdm(total=total, initial=done, unit="log")
+
+
+def _pandas() -> Any:
+    try:
+        import pandas
+        import pyarrow  # noqa: F401  (pandas writes Parquet with it)
+    except ImportError as missing:
+        raise ImportError("a fleet needs the packages pandas and pyarrow: pip install pandas pyarrow") from missing
+    return pandas
+
