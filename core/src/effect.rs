@@ -37,6 +37,8 @@ pub struct EffectMeta {
     /// It acts before the machine, on the way of a command through driver and supply. An input that was
     /// measured at the machine has gone that way already.
     pub before_input: bool,
+    /// It is the law of the actuator's output: at its inputs it acts on what all other effects leave of the command.
+    pub acts_last: bool,
     /// How rare it is: 0 nearly every machine has it, 1 common, 2 rare. Orders explanations that a
     /// recording cannot tell apart.
     pub rarity: u8,
@@ -68,6 +70,7 @@ impl EffectMeta {
         sided: false,
         shared_only: false,
         before_input: false,
+        acts_last: false,
         rarity: 1,
         simpler: &[],
         parameters: &[],

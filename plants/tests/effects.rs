@@ -218,6 +218,22 @@ fn every_effect_fits_somewhere_and_its_declaration_reads() {
     }
 }
 
+/// A power of what the lag leaves, wherever it stands in the file: half way up, the square is a quarter.
+#[test]
+fn the_law_of_an_actuator_acts_last() {
+    let power =
+        "[[effect]]\n[effect.input_power]\nat = [\"input\"]\nexponent = 2.0\nreference = 6.0\n";
+    let lag = "[[effect]]\n[effect.actuator_lag]\nat = [\"input\"]\nlag = 0.1\n";
+    let run = |effects: &str| {
+        let seen = "[log.measured]\nspeed = { sensor = \"instantaneous\" }\n";
+        let model = model(&format!("{AXIS}{effects}{seen}"));
+        simulate(&model, &model.values())
+    };
+    let (first, second) = (run(&format!("{power}{lag}")), run(&format!("{lag}{power}")));
+    assert!(difference(&first, &second) < 1e-12);
+    assert!(difference(&first, &run(power)) > 0.01);
+}
+
 #[test]
 fn defaults_change_nothing() {
     each_case(|name, with, _, nominal| {

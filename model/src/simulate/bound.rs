@@ -23,7 +23,8 @@ pub(crate) struct Bound {
     pub(crate) history: Option<usize>,
 }
 
-/// All effects of a model by the kind of place they act at, in the model's order.
+/// All effects of a model by the kind of place they act at, in the model's order. On inputs the laws of an
+/// actuator's output come last.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Bounds {
     /// With memory, on inputs.
@@ -72,6 +73,8 @@ impl Bounds {
                 }
             }
         }
+        let last = |bound: &Bound| model.effects[bound.effect].meta.acts_last;
+        bounds.inputs.sort_by_key(last);
         bounds
     }
 

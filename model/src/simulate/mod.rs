@@ -37,7 +37,7 @@ use stiff::{Implicit, Way};
 ///
 /// Order of evaluation at each stage: effects on inputs, the plant's outputs, efforts, the plant,
 /// effects on the rates of its states. Effects with memory on inputs come first, once per
-/// integration step; effects on sensors act on what is measured.
+/// integration step, and laws of an actuator's output last; effects on sensors act on what is measured.
 #[derive(Clone)]
 pub struct Simulator<'m, S> {
     model: Cow<'m, Model>,

@@ -21,8 +21,10 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 /// At `u = 0` the output is 0 whatever the exponent is. With `n < 1` the slope over `u` is infinite there; it is
 /// taken for 0, so that a fit gets a number.
 ///
-/// Assumptions: the same in both directions; at once. A fan that takes time to come to speed has
-/// `actuator_lag` as well.
+/// It acts last of all effects at an input, wherever it stands in the file: a fan's speed lags behind its command,
+/// and its thrust is a power of the speed that it has come to. So `u` is what delay, lag, dead zone and offset leave.
+///
+/// Assumptions: the same in both directions; at once.
 ///
 /// Two levels of one size (a PRBS) do not show it, and two levels of any size cannot tell it from
 /// an offset with another gain.
@@ -62,6 +64,7 @@ impl Effect for InputPower {
             .known(),
         ],
         before_input: true,
+        acts_last: true,
         ..EffectMeta::PLAIN
     };
 
