@@ -231,6 +231,12 @@ pub trait Effect: EffectArrays + Sized + Send + Sync + 'static {
         let _ = (at, p);
         Self::State::filled(S::zero())
     }
+
+    /// The states within their limits, asked for after every integration step: what exceeds them is lost.
+    fn confine<S: Real>(z: &Self::State<S>, p: &Self::Parameters<S>) -> Self::State<S> {
+        let _ = p;
+        *z
+    }
 }
 
 /// The object-safe view of an effect for one scalar, on slices. Made by
@@ -242,6 +248,10 @@ pub trait Physics<S: Real>: Send + Sync {
     fn state_derivative(&self, at: &Reading<'_, S>, z: &[S], p: &[S], dz: &mut [S]);
     /// See [`Effect::initial_state`].
     fn initial_state(&self, at: &Reading<'_, S>, p: &[S], z: &mut [S]);
+    /// See [`Effect::confine`].
+    fn confine(&self, z: &mut [S], p: &[S]) {
+        let _ = (z, p);
+    }
 }
 
 /// Makes an [`Effect`] available behind [`Physics`].
@@ -294,6 +304,15 @@ macro_rules! declare_effect {
                     return;
                 };
                 let state = <$effect as $crate::Effect>::initial_state::<S>(at, p);
+                for (to, from) in z.iter_mut().zip(state) {
+                    *to = from;
+                }
+            }
+            fn confine(&self, z: &mut [S], p: &[S]) {
+                let (Ok(from), Ok(p)) = ((&*z).try_into(), p.try_into()) else {
+                    return;
+                };
+                let state = <$effect as $crate::Effect>::confine::<S>(from, p);
                 for (to, from) in z.iter_mut().zip(state) {
                     *to = from;
                 }

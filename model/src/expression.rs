@@ -18,6 +18,7 @@ mod parse;
 mod plant;
 mod precedence;
 mod program;
+mod states;
 mod table;
 #[cfg(test)]
 mod tests;

@@ -67,8 +67,13 @@ fn damaged_models_never_panic() {
                    [[effect]]\n[effect.input_delay]\nat = [\"input.left\"]\ndelay = 0.02\n\
                    [fit]\nfree = [\"wheel_radius\"]\n[simulation]\nmax_step_s = 0.001\n";
     texts.push(format!("{}{effects}", texts[0]));
-    for name in ["pendulum.toml", "twil.toml"] {
-        let path = repository().join("examples/expressions").join(name);
+    for name in [
+        "expressions/pendulum.toml",
+        "expressions/twil.toml",
+        "own-states/clutch.toml",
+        "own-states/lag.toml",
+    ] {
+        let path = repository().join("examples").join(name);
         texts.push(std::fs::read_to_string(path).unwrap());
     }
     for (seed, text) in texts.iter().enumerate() {

@@ -2,6 +2,7 @@
 
 use super::Names;
 use super::program::FIRST_BANK;
+use super::states::StateTable;
 use super::table::{Ordered, ParameterTable};
 use super::tree::{Slot, Tree};
 use crate::model::signals;
@@ -11,17 +12,39 @@ pub(super) const PARAMETERS: u8 = FIRST_BANK;
 pub(super) const ROLES: u8 = FIRST_BANK + 1;
 pub(super) const SIGNALS: u8 = FIRST_BANK + 2;
 pub(super) const HERE: u8 = FIRST_BANK + 3;
-/// What an effect sees beside signals, in this order.
+/// What an effect sees beside signals, in this order; its states follow.
 pub(super) const HERE_NAMES: [&str; 3] = ["nominal", "side", "time"];
+
+/// Where in an effect an expression stands: not every name has a meaning everywhere.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Site {
+    /// The force, or the rate of a state.
+    Rate,
+    /// The start of a state.
+    Start,
+    /// A limit of a state.
+    Limit,
+}
 
 /// The names at some channels of a plant.
 pub(super) struct AtChannels<'a> {
     pub(super) plant: &'static PlantMeta,
     pub(super) at: &'a [&'static Channel],
     pub(super) parameters: &'a Ordered<ParameterTable>,
+    pub(super) states: &'a Ordered<StateTable>,
+}
+
+/// Those names at one site.
+pub(super) struct AtSite<'a> {
+    names: &'a AtChannels<'a>,
+    site: Site,
 }
 
 impl AtChannels<'_> {
+    pub(super) fn at_site(&self, site: Site) -> AtSite<'_> {
+        AtSite { names: self, site }
+    }
+
     fn signal(&self, id: &str) -> Option<usize> {
         signals(self.plant).position(|s| s.id == id)
     }
@@ -61,11 +84,9 @@ impl AtChannels<'_> {
     }
 }
 
-impl Names for AtChannels<'_> {
-    fn find(&self, name: &str) -> Option<Result<Tree, String>> {
-        if let Some(index) = self.parameters.position(name) {
-            return Some(Ok(Tree::Name(slot(PARAMETERS, index))));
-        }
+impl AtChannels<'_> {
+    /// What is read at the channels.
+    fn here(&self, name: &str) -> Option<Result<Tree, String>> {
         if let Some(index) = HERE_NAMES.iter().position(|n| *n == name) {
             return Some(Ok(Tree::Name(slot(HERE, index))));
         }
@@ -75,14 +96,50 @@ impl Names for AtChannels<'_> {
         self.signal(name)
             .map(|index| Ok(Tree::Name(slot(SIGNALS, index))))
     }
+}
+
+/// Where the `index`-th state of an effect is found.
+pub(super) fn state_slot(index: usize) -> Slot {
+    slot(HERE, HERE_NAMES.len() + index)
+}
+
+impl Names for AtSite<'_> {
+    fn find(&self, name: &str) -> Option<Result<Tree, String>> {
+        let names = self.names;
+        if let Some(index) = names.parameters.position(name) {
+            return Some(Ok(Tree::Name(slot(PARAMETERS, index))));
+        }
+        let state = names.states.position(name);
+        match self.site {
+            Site::Rate => match state {
+                Some(index) => Some(Ok(Tree::Name(state_slot(index)))),
+                None => names.here(name),
+            },
+            Site::Start if state.is_some() => {
+                Some(Err(format!("the start of a state cannot read the state `{name}`")))
+            }
+            Site::Start => names.here(name),
+            Site::Limit => (state.is_some() || names.here(name).is_some()).then(|| {
+                Err(format!(
+                    "the limit of a state is a number or depends on parameters, it cannot read `{name}`"
+                ))
+            }),
+        }
+    }
 
     fn known(&self) -> Vec<String> {
-        let everywhere = |r: &Role| self.at.iter().all(|c| c.read(*r).is_some());
+        let at = self.names;
+        let mut names: Vec<String> = at.parameters.ids().map(str::to_owned).collect();
+        if self.site == Site::Limit {
+            return names;
+        }
+        if self.site == Site::Rate {
+            names.extend(at.states.ids().map(str::to_owned));
+        }
+        let everywhere = |r: &Role| at.at.iter().all(|c| c.read(*r).is_some());
         let roles = Role::ALL.into_iter().filter(everywhere).map(Role::id);
-        let own = self.parameters.ids().map(str::to_owned);
-        let read = roles.chain(HERE_NAMES).map(str::to_owned);
-        let mut names: Vec<String> = own.chain(read).collect();
-        for signal in signals(self.plant) {
+        names.extend(roles.chain(HERE_NAMES).map(str::to_owned));
+        for signal in signals(at.plant) {
             if !names.iter().any(|n| n == signal.id) {
                 names.push(signal.id.to_owned());
             }

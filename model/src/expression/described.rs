@@ -61,8 +61,8 @@ d = { value = 0.5, unit = \"1/s\", range = [0.0, 10.0] }
 pub(crate) const EFFECT_PART: PartMeta = PartMeta {
     id: "expression",
     role: "effect",
-    summary: "an effect of your own, as an expression in the model file",
-    equation: "w = force(flow, position, drive, …, nominal, side, time, signals; parameters)",
+    summary: "an effect of your own, as expressions in the model file; it may have states",
+    equation: "w = force(states, flow, position, drive, …, nominal, side, time, signals; parameters);  z_i' = rate_i(the same)",
     reference: "docs/own-in-toml.md",
     example: "[[effect]]
 [effect.expression]
@@ -79,7 +79,17 @@ s = { value = 0.1, unit = \"rad/s\", above = 0.0, held = true, doc = \"width of 
         Setting::new(
             "force",
             "",
-            "what is added there, in the channel's unit; names: the channel's roles (flow, position, drive, …), nominal, side, time, signals of the plant, the parameters",
+            "what is added there, in the channel's unit; names: the channel's roles (flow, position, drive, …), nominal, side, time, signals of the plant, the parameters, the states",
+        ),
+        Setting::new(
+            "states",
+            "",
+            "a table for each, of its own at each channel: unit, rate (an expression), start (a number or an expression, 0 without it), limits (two numbers, or expressions of parameters; what exceeds them is lost), doc",
+        ),
+        Setting::new(
+            "max_step_s",
+            "s",
+            "longest integration step that follows its states; without it that of the model",
         ),
         Setting::new(
             "name",

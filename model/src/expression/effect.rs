@@ -2,14 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::at_channels::{AtChannels, HERE_NAMES, PARAMETERS, ROLES, SIGNALS, slot};
+use super::at_channels::{
+    AtChannels, HERE, HERE_NAMES, PARAMETERS, ROLES, SIGNALS, Site, slot, state_slot,
+};
 use super::described::EFFECT_PART;
 use super::keep::{self, Kept};
 use super::parse::parse;
 use super::placed;
 use super::program::Program;
+use super::states::{self, Motion, Reads, StateTable};
 use super::table::{Ordered, ParameterTable, check_name, check_unit, check_used};
-use super::tree::Tree;
+use super::tree::{Slot, Tree};
 use crate::Dual;
 use crate::attach::unit_at;
 use crate::config::{Mistake, PathSegment};
@@ -18,6 +21,9 @@ use crate::registry::{AnyPhysics, EffectPart, ReadyEffect, Values, effects};
 use loopsight_core::{
     Channel, EffectMeta, Parameter, Physics, PlaceKind, PlantMeta, Reading, Real, Role,
 };
+
+/// Shortest integration step that a file may ask for, s: with shorter ones a second takes minutes.
+const SHORTEST_STEP: f64 = 1e-7;
 
 /// `[effect.expression]`, as written.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -32,6 +38,10 @@ pub(crate) struct EffectTable {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     on: Vec<String>,
     force: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    max_step_s: Option<f64>,
+    #[serde(default, skip_serializing_if = "Ordered::is_empty")]
+    states: Ordered<StateTable>,
     #[serde(default, skip_serializing_if = "Ordered::is_empty")]
     parameters: Ordered<ParameterTable>,
 }
@@ -40,6 +50,8 @@ pub(crate) struct EffectTable {
 struct Law {
     meta: EffectMeta,
     force: Program,
+    /// None where it has no states.
+    motion: Option<Motion>,
     /// Signals it reads by their own name.
     signals: Vec<usize>,
 }
@@ -50,26 +62,45 @@ macro_rules! physics {
             fn contribution(
                 &self,
                 at: &Reading<'_, $scalar>,
-                _z: &[$scalar],
+                z: &[$scalar],
                 p: &[$scalar],
             ) -> $scalar {
-                let here = [at.nominal, at.side, <$scalar>::of(at.time)];
-                self.force.value(&[p, &Role::ALL.map(|r| at.get(r)), at.signals, &here])
+                let Some(motion) = &self.motion else {
+                    let here = [at.nominal, at.side, <$scalar>::of(at.time)];
+                    let roles = Role::ALL.map(|r| at.get(r));
+                    return self.force.value(&[p, &roles, at.signals, &here]);
+                };
+                let mut reads = Reads::new(at, z);
+                motion.confine(reads.states(), p);
+                self.force.value(&reads.banks(p))
             }
             fn state_derivative(
                 &self,
-                _at: &Reading<'_, $scalar>,
-                _z: &[$scalar],
-                _p: &[$scalar],
-                _dz: &mut [$scalar],
+                at: &Reading<'_, $scalar>,
+                z: &[$scalar],
+                p: &[$scalar],
+                dz: &mut [$scalar],
             ) {
+                if let Some(motion) = &self.motion {
+                    let mut reads = Reads::new(at, z);
+                    motion.confine(reads.states(), p);
+                    motion.rates(&reads, p, dz);
+                }
             }
             fn initial_state(
                 &self,
-                _at: &Reading<'_, $scalar>,
-                _p: &[$scalar],
-                _z: &mut [$scalar],
+                at: &Reading<'_, $scalar>,
+                p: &[$scalar],
+                z: &mut [$scalar],
             ) {
+                if let Some(motion) = &self.motion {
+                    motion.starts(&Reads::new(at, &[]), p, z);
+                }
+            }
+            fn confine(&self, z: &mut [$scalar], p: &[$scalar]) {
+                if let Some(motion) = &self.motion {
+                    motion.confine(z, p);
+                }
             }
         }
     )*};
@@ -91,8 +122,8 @@ impl EffectTable {
             .collect();
         let ids: Vec<&str> = at.iter().map(|c| c.id).collect();
         let key = format!(
-            "{:p} {ids:?} {:?} {:?} {:?} {parameters:?}",
-            plant, self.name, self.summary, self.force
+            "{:p} {ids:?} {:?} {:?} {:?} {:?} {:?} {parameters:?}",
+            plant, self.name, self.summary, self.force, self.max_step_s, self.states
         );
         LAWS.get(key, || self.understand(plant, at))
     }
@@ -102,40 +133,58 @@ impl EffectTable {
         plant: &'static PlantMeta,
         at: &[&'static Channel],
     ) -> Result<Law, Mistake> {
-        for (id, _) in self.parameters.iter() {
-            let signal = signals(plant).any(|s| s.id == id);
+        let taken = |id: &str| {
             let role = Role::ALL.iter().any(|r| r.id() == id);
-            let taken = if HERE_NAMES.contains(&id) || role {
-                Some("what an effect can read")
-            } else {
-                signal.then_some("a signal of the plant")
-            };
-            check_name("parameters", id, taken)?;
+            if HERE_NAMES.contains(&id) || role {
+                return Some("what an effect can read");
+            }
+            let signal = signals(plant).any(|s| s.id == id);
+            signal.then_some("a signal of the plant")
+        };
+        for id in self.parameters.ids() {
+            check_name("parameters", id, taken(id))?;
         }
         let names = AtChannels {
             plant,
             at,
             parameters: &self.parameters,
+            states: &self.states,
         };
+        states::check(&self.states, &names, taken)?;
         let force: [PathSegment; 1] = ["force".into()];
-        let tree = parse(&self.force, &names).map_err(|e| placed(&force, e))?;
+        let tree = parse(&self.force, &names.at_site(Site::Rate)).map_err(|e| placed(&force, e))?;
+        let moved = states::read(&names)?;
+        let trees: Vec<&Tree> = [&tree].into_iter().chain(moved.trees()).collect();
+        let missing = if self.states.is_empty() {
+            "is not in the expression"
+        } else {
+            "is in no expression"
+        };
         check_used(
             "parameters",
             self.parameters.ids(),
-            &[&tree],
+            &trees,
             |i| slot(PARAMETERS, usize::from(i)),
-            "is not in the expression",
+            missing,
         )?;
+        let index_of = |s: Slot| {
+            let first = usize::from(state_slot(0).index);
+            let own = s.bank == HERE;
+            usize::from(s.index).checked_sub(first).filter(|_| own)
+        };
+        states::check_used(&self.states, &tree, &moved.rates, index_of)?;
         let mut read = Vec::new();
         let mut roles = Vec::new();
-        tree.for_each_name(&mut |slot| {
-            let index = usize::from(slot.index);
-            match slot.bank {
-                SIGNALS if !read.contains(&index) => read.push(index),
-                ROLES => roles.extend(Role::ALL.get(index).filter(|r| !roles.contains(*r))),
-                _ => {}
-            }
-        });
+        for tree in &trees {
+            tree.for_each_name(&mut |slot| {
+                let index = usize::from(slot.index);
+                match slot.bank {
+                    SIGNALS if !read.contains(&index) => read.push(index),
+                    ROLES => roles.extend(Role::ALL.get(index).filter(|r| !roles.contains(*r))),
+                    _ => {}
+                }
+            });
+        }
         let parameters = self.declare(plant, at, &tree)?;
         let meta = EffectMeta {
             id: keep::text(self.name.as_deref().unwrap_or(EFFECT_PART.id)),
@@ -146,17 +195,24 @@ impl EffectTable {
             ),
             symptom: "what the expression says is missing from the model",
             remedy: "command against what the expression says, where the drive allows it",
-            equation: keep::text(&format!("w = {}", self.force.trim())),
+            equation: keep::text(&format!(
+                "{}w = {}",
+                states::equation(&self.states),
+                self.force.trim()
+            )),
             reference: "the model file",
             example: EFFECT_PART.example,
             places: &PlaceKind::ALL,
             reads: roles.leak(),
             parameters: parameters.leak(),
+            states: self.states.len(),
+            max_step_s: self.max_step_s.unwrap_or(f64::INFINITY),
             ..EffectMeta::PLAIN
         };
         Ok(Law {
             meta,
             force: Program::new([&tree]),
+            motion: (!self.states.is_empty()).then(|| Motion::new(&moved)),
             signals: read,
         })
     }
@@ -173,7 +229,8 @@ impl EffectTable {
         };
         let found = tree.dependence(&|s| s.bank == PARAMETERS && !held(s.index));
         let declare = |(index, (id, table)): (usize, (&str, &ParameterTable))| {
-            let linear = found.linear.contains(&slot(PARAMETERS, index));
+            // What moves a state is not in proportion to a parameter, whatever the force is.
+            let linear = self.states.is_empty() && found.linear.contains(&slot(PARAMETERS, index));
             let parameter = table.declare(id, linear)?;
             // `channel` and `flow` may stand in a unit, as in those of the library.
             let unit = at.first().map_or_else(
@@ -191,6 +248,12 @@ impl EffectTable {
         if !self.at.is_empty() && !self.on.is_empty() {
             let message = "the channels are given as `at` and as `on`, expected one of them";
             return Err(Mistake::key(["on".into()], message));
+        }
+        let follows = |step: &f64| step.is_finite() && *step >= SHORTEST_STEP;
+        if let Some(step) = self.max_step_s.filter(|step| !follows(step)) {
+            let message =
+                format!("`max_step_s` is {step}, expected a number of {SHORTEST_STEP:e} s or more");
+            return Err(Mistake::value(["max_step_s".into()], message));
         }
         if let Some(name) = &self.name {
             let path: [PathSegment; 1] = ["name".into()];

@@ -144,6 +144,7 @@ impl Acting {
                 for (k, from) in z.clone().zip(before) {
                     self.x[k] = from + share * h * self.rates[k];
                 }
+                Scene::confine(model, &self.values, &self.late[i], &mut self.x);
                 if share < 1.0 {
                     let scene = self.scene(model, self.time, at);
                     sum += scene.contribution(&self.late[i], nominal, &NoPast);

@@ -188,4 +188,16 @@ impl<S: HostReal> Scene<'_, S> {
             z,
         );
     }
+
+    /// Brings its states within their limits.
+    pub(crate) fn confine(model: &Model, values: &[S], bound: &Bound, x: &mut [S]) {
+        if bound.n_z > 0 {
+            let effect = &model.effects[bound.effect];
+            let first = effect.first_parameter;
+            S::physics(effect.physics).confine(
+                &mut x[bound.z..bound.z + bound.n_z],
+                &values[first..first + effect.meta.parameters.len()],
+            );
+        }
+    }
 }

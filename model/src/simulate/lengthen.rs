@@ -23,6 +23,8 @@ pub(crate) struct Lengthened<S> {
     steps: usize,
     /// How they were made.
     way: Way,
+    /// The fastest rate at its end, 1/s.
+    fastest: f64,
     /// Largest magnitude of each state so far.
     size: Vec<f64>,
     before: Vec<S>,
@@ -35,6 +37,7 @@ impl<S: HostReal> Lengthened<S> {
         Self {
             steps: 1,
             way: Way::Explicit,
+            fastest: 0.0,
             size: vec![0.0; states],
             before: vec![S::zero(); states],
             coarse: vec![S::zero(); states],
@@ -83,6 +86,10 @@ impl<S: HostReal> Simulator<'_, S> {
             _ => Way::Explicit,
         };
         let mut linearised = false;
+        if self.time == 0.0 {
+            kept.fastest = self.fastest(input, 0.0);
+        }
+        let mut end = None;
         let mut steps = (kept.steps / 4).clamp(1, most);
         self.integrate_by(way, input, span, steps, &mut linearised);
         while steps < most {
@@ -91,7 +98,13 @@ impl<S: HostReal> Simulator<'_, S> {
             steps = (2 * steps).min(most);
             self.integrate_by(way, input, span, steps, &mut linearised);
             if kept.agrees(&self.x) {
-                break;
+                let fastest = self.fastest(input, span);
+                // The Jacobian is that of the end now.
+                linearised = false;
+                if way.is_stable(span / steps as f64, [kept.fastest, fastest]) {
+                    end = Some(fastest);
+                    break;
+                }
             }
             if way == Way::Explicit && steps >= STIFF {
                 kept.explicit.clone_from(&self.x);
@@ -101,20 +114,26 @@ impl<S: HostReal> Simulator<'_, S> {
                 self.x.clone_from(&kept.before);
                 self.integrate_by(Way::Implicit, input, span, steps, &mut linearised);
                 if kept.agrees(&self.x) {
-                    way = Way::Implicit;
-                    break;
+                    let fastest = self.fastest(input, span);
+                    linearised = false;
+                    if Way::Implicit.is_stable(span / steps as f64, [kept.fastest, fastest]) {
+                        (way, end) = (Way::Implicit, Some(fastest));
+                        break;
+                    }
                 }
                 self.x.clone_from(&kept.explicit);
             }
         }
         kept.way = way;
         kept.steps = steps;
+        kept.fastest = end.unwrap_or_else(|| self.fastest(input, span));
         kept.keep(&self.x);
         if !self.bounds.output_memory.is_empty() {
             // The past of a sensor needs some points, too.
             self.x.clone_from(&kept.before);
             let steps = steps.max(PAST).min(most);
             if way == Way::Implicit {
+                self.fastest(input, 0.0);
                 self.implicit.prepare(span / steps as f64);
             }
             self.way = way;
@@ -145,5 +164,17 @@ impl<S: HostReal> Simulator<'_, S> {
         }
         self.way = way;
         self.integrate(input, span, steps, false);
+    }
+
+    /// The fastest rate of the model where it is now, `elapsed` seconds after the start of the interval: 1/s. The
+    /// Jacobian is the one there afterwards.
+    fn fastest(&mut self, input: &[f64], elapsed: f64) -> f64 {
+        self.apply(input, elapsed);
+        self.way = Way::Linearise;
+        // What an input does later is no part of it, and nothing is to be remembered.
+        let slopes = std::mem::take(&mut self.slopes);
+        self.step(self.time + elapsed, 0.0);
+        self.slopes = slopes;
+        self.implicit.fastest()
     }
 }

@@ -150,6 +150,11 @@ impl<S: HostReal> Simulator<'_, S> {
             Way::Implicit => implicit.step(x, h, rates),
             Way::Linearise => implicit.linearise(x, rates),
         }
+        if bounds.states > 0 {
+            for bound in bounds.all() {
+                Scene::confine(model, values, bound, x);
+            }
+        }
         if ramping {
             ramped(held, bounds, slopes, h);
         }

@@ -8,6 +8,10 @@ use nalgebra::DMatrix;
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 /// Difference for the Jacobian, relative to a state: the root of the rounding error.
 const DIFFERENCE: f64 = 1e-8;
+/// Squarings for the spectral radius: what the units of the states distort, shows in it by its 32nd root.
+const SQUARINGS: usize = 5;
+/// Radius of the half disc in which the classical method of Runge and Kutta is stable.
+const STABLE: f64 = 2.5;
 
 /// What a step does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,8 +32,10 @@ pub(super) enum Way {
 /// ```
 ///
 /// It is of second order whatever matrix `A` is, and L-stable where `A` is the Jacobian of `f`: what is faster than
-/// the step settles at once, as it does in the machine. So one Jacobian of the values, by differences, serves a whole
-/// interval, and derivatives by parameters need none of their own.
+/// the step settles at once, as it does in the machine. So one Jacobian, by differences, serves a whole interval.
+///
+/// Derivatives by parameters are those of the method itself: `A` has derivatives of its own, and where `k` solves
+/// `M k = b` its derivative solves `M k' = b' - M' k`.
 ///
 /// (J. G. Verwer, E. J. Spee, J. G. Blom, W. Hundsdorfer, 1999, "A second-order Rosenbrock method applied to
 /// photochemical dispersion problems", SIAM J. Sci. Comput. 20, 1456–1480, equation 2.6.)
@@ -37,6 +43,10 @@ pub(super) enum Way {
 pub(super) struct Implicit<S> {
     /// `A`.
     jacobian: DMatrix<f64>,
+    /// The derivatives of `A` alone, row by row: numbers whose value is zero.
+    slopes: Vec<S>,
+    /// `γh` of the present step.
+    weight: f64,
     /// `(I - γhA)⁻¹` of the present step.
     inverse: DMatrix<f64>,
     k1: Vec<S>,
@@ -45,11 +55,31 @@ pub(super) struct Implicit<S> {
     rate: Vec<S>,
 }
 
+impl Way {
+    /// Whether steps of `h` seconds are stable where the fastest rates are these, at the start of the interval, whose
+    /// Jacobian the method has, and at its end.
+    ///
+    /// An error that grows from rounding stays below any tolerance for a while, and the derivatives by parameters, which
+    /// nothing checks, do not.
+    pub(super) fn is_stable(self, h: f64, fastest: [f64; 2]) -> bool {
+        let [start, end] = fastest.map(|rate| h * rate);
+        if self == Self::Explicit {
+            return start.max(end) <= STABLE;
+        }
+        // The method's factor for `x' = -end x` with the matrix of `start`.
+        let q = 1.0 / (1.0 + GAMMA * start);
+        let s = -end * q;
+        (1.0 + 2.0 * s + 0.5 * s * s - s * q).abs() <= 1.0
+    }
+}
+
 impl<S: HostReal> Implicit<S> {
     /// Nothing is kept before a model is stiff.
     pub(super) fn new() -> Self {
         Self {
             jacobian: DMatrix::zeros(0, 0),
+            slopes: Vec::new(),
+            weight: 0.0,
             inverse: DMatrix::zeros(0, 0),
             k1: Vec::new(),
             k2: Vec::new(),
@@ -67,6 +97,8 @@ impl<S: HostReal> Implicit<S> {
                 buffer.clear();
                 buffer.resize(n, S::zero());
             }
+            self.slopes.clear();
+            self.slopes.resize(n * n, S::zero());
         }
         f(0, x, &mut self.rate);
         self.stage.copy_from_slice(x);
@@ -76,15 +108,35 @@ impl<S: HostReal> Implicit<S> {
             f(0, &self.stage, &mut self.k1);
             self.stage[j] = *at;
             for (i, (moved, rate)) in self.k1.iter().zip(&self.rate).enumerate() {
+                let slope = (*moved - *rate).times(S::of(1.0 / change));
                 self.jacobian[(i, j)] = (moved.value() - rate.value()) / change;
+                self.slopes[i * n + j] = slope - S::of(slope.value());
             }
         }
+    }
+
+    /// The fastest rate at the Jacobian: its spectral radius, by Gelfand's formula `‖Aⁿ‖^(1/n)`.
+    pub(super) fn fastest(&self) -> f64 {
+        let mut power = self.jacobian.clone();
+        let (mut radius, mut share) = (1.0, 1.0);
+        for _ in 0..=SQUARINGS {
+            let norm = power.norm();
+            if norm == 0.0 || !norm.is_finite() {
+                return norm;
+            }
+            radius *= norm.powf(share);
+            share *= 0.5;
+            power /= norm;
+            power = &power * &power;
+        }
+        radius
     }
 
     /// Makes ready for steps of `h` seconds; the Jacobian must be known.
     pub(super) fn prepare(&mut self, h: f64) {
         let n = self.jacobian.nrows();
-        let matrix = DMatrix::identity(n, n) - &self.jacobian * (GAMMA * h);
+        self.weight = GAMMA * h;
+        let matrix = DMatrix::identity(n, n) - &self.jacobian * self.weight;
         self.inverse = matrix
             .clone()
             .try_inverse()
@@ -98,7 +150,7 @@ impl<S: HostReal> Implicit<S> {
         for rate in &mut self.rate {
             *rate = rate.times(S::of(h));
         }
-        solve(&self.inverse, &self.rate, &mut self.k1);
+        self.solve(|this| &mut this.k1);
         for ((stage, x), k1) in self.stage.iter_mut().zip(x.iter()).zip(&self.k1) {
             *stage = *x + *k1;
         }
@@ -106,15 +158,29 @@ impl<S: HostReal> Implicit<S> {
         for (rate, k1) in self.rate.iter_mut().zip(&self.k1) {
             *rate = rate.times(S::of(h)) - k1.times(S::of(2.0));
         }
-        solve(&self.inverse, &self.rate, &mut self.k2);
+        self.solve(|this| &mut this.k2);
         for ((x, k1), k2) in x.iter_mut().zip(&self.k1).zip(&self.k2) {
             *x += k1.times(S::of(1.5)) + k2.times(S::of(0.5));
         }
     }
+
+    /// Solves `(I - γhA) k = rate`, where `rate` is no longer needed afterwards.
+    fn solve(&mut self, k: impl Fn(&mut Self) -> &mut Vec<S>) {
+        let mut found = std::mem::take(k(self));
+        multiply(&self.inverse, &self.rate, &mut found);
+        let n = found.len();
+        for (rate, slopes) in self.rate.iter_mut().zip(self.slopes.chunks_exact(n.max(1))) {
+            for (slope, found) in slopes.iter().zip(&found) {
+                *rate += slope.times(S::of(self.weight * found.value()));
+            }
+        }
+        multiply(&self.inverse, &self.rate, &mut found);
+        *k(self) = found;
+    }
 }
 
 /// `to = matrix · from`.
-fn solve<S: HostReal>(matrix: &DMatrix<f64>, from: &[S], to: &mut [S]) {
+fn multiply<S: HostReal>(matrix: &DMatrix<f64>, from: &[S], to: &mut [S]) {
     for (i, to) in to.iter_mut().enumerate() {
         *to = S::zero();
         for (j, from) in from.iter().enumerate() {
@@ -126,6 +192,7 @@ fn solve<S: HostReal>(matrix: &DMatrix<f64>, from: &[S], to: &mut [S]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{derivative, variable};
 
     /// A slow and a fast state, 2 ms beside 5 s: the fast one follows `sin` of time through the slow one.
     fn ends(steps: usize) -> [f64; 2] {
@@ -169,5 +236,34 @@ mod tests {
         };
         let ratio = error(50) / error(100);
         assert!((ratio - 4.0).abs() < 0.3, "{ratio}");
+    }
+
+    /// A fast state whose speed, and whose goal, depend on a parameter: beside differences of two simulations.
+    #[test]
+    fn derivatives_are_those_of_the_values() {
+        fn end<S: HostReal>(p: S) -> S {
+            let mut x = [S::one(), S::zero()];
+            let f = |_: usize, x: &[S], dx: &mut [S]| {
+                dx[0] = -x[0];
+                let speed = S::of(2000.0) * p * (S::of(0.2) + x[0]);
+                dx[1] = speed * (p.sin() * x[0] - x[1]);
+            };
+            let mut method = Implicit::new();
+            for _ in 0..40 {
+                method.linearise(&x, f);
+                method.prepare(0.05);
+                method.step(&mut x, 0.05, f);
+            }
+            x[1]
+        }
+        let found = derivative(&end(variable(0.7, 0)), 0);
+        let by_difference = (end(0.7 + 1e-5) - end(0.7 - 1e-5)) / 2e-5;
+        assert!(
+            (found - by_difference).abs() < 1e-5,
+            "{found} {by_difference}"
+        );
+        // It follows sin(p) e^-2 and, as it is a little late, a little more.
+        let exact = 0.7f64.cos() * (-2.0f64).exp();
+        assert!((found - exact).abs() < 0.02 * exact, "{found} {exact}");
     }
 }

@@ -8,6 +8,8 @@
 )]
 
 mod mistakes;
+mod state_mistakes;
+mod states;
 
 use loopsight_core::{AffineModel, Place, Plant, Real, Role};
 use loopsight_model::expression::{EffectDraft, ParameterDraft};

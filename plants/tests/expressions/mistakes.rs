@@ -7,7 +7,7 @@ use loopsight_model::model::{Model, ModelError};
 use super::{AXIS, OWN_FRICTION};
 
 /// What is wrong, where, and what would be right; one line each.
-fn shown(texts: &[String]) -> String {
+pub(super) fn shown(texts: &[String]) -> String {
     let mut all = String::new();
     for text in texts {
         match Model::from_toml("m", text) {
@@ -116,7 +116,7 @@ m:8:8: `coulomb_friction` is the name of an effect of the library
     at `"coulomb_friction"`
 m:9:7: a number or a name is missing before `*`
     at `*`
-m:8:1: unknown name `forse` in `expression`, expected one of name, summary, at, on, force, parameters
+m:8:1: unknown name `forse` in `expression`, expected one of name, summary, at, on, force, max_step_s, states, parameters
     at `forse`
     did you mean `force`?
 "#;

@@ -446,8 +446,15 @@ proptest! {
 #[test]
 fn models_of_the_registry() {
     let examples = plants().into_iter().map(|meta| meta.example.to_owned());
-    let own = ["pendulum.toml", "robot.toml", "twil.toml"].map(|name| {
-        let path = loopsight_tests::repository().join("examples/expressions");
+    let files = [
+        "expressions/pendulum.toml",
+        "expressions/robot.toml",
+        "expressions/twil.toml",
+        "own-states/clutch.toml",
+        "own-states/oscillator.toml",
+    ];
+    let own = files.map(|name| {
+        let path = loopsight_tests::repository().join("examples");
         std::fs::read_to_string(path.join(name)).unwrap()
     });
     for text in examples.chain(own) {

@@ -5,6 +5,8 @@
     reason = "helpers of tests: a failure is the test's failure"
 )]
 
+mod states;
+
 use std::collections::BTreeMap;
 
 use loopsight_diagnosis::fit;
@@ -125,11 +127,14 @@ fn what_is_documented_works() {
         .skip(1)
         .map(|b| b.split("```").next().unwrap())
         .collect();
-    assert_eq!(blocks.len(), 2);
+    assert_eq!(blocks.len(), 3);
     let twil = std::fs::read_to_string(repository().join("examples/twil/model.toml")).unwrap();
     let with = model(&format!("{twil}\n{}", blocks[0]));
     assert_eq!(with.effects[0].at.len(), 2);
-    let pendulum = model(blocks[1]);
+    let oscillator = "[plant.oscillator.physical]\nmass = 2.0\nstiffness = 5e4\ndamping = 10.0\n";
+    let with = model(&format!("{oscillator}\n{}", blocks[1]));
+    assert_eq!(with.effects[0].meta.states, 1);
+    let pendulum = model(blocks[2]);
     assert_eq!(pendulum.parameters.len(), 4);
     assert!(pendulum.affine().is_some());
 }
