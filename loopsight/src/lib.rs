@@ -128,7 +128,7 @@ pub use explain::explain;
 pub use fit::{FitOptions, Method, Scheme};
 pub use improve::ImproveOptions;
 pub use inspect::{InspectOptions, inspect, inspect_file};
-pub use list::{ListOptions, PartRole, list};
+pub use list::{ListOptions, PartRole, effects_for, list};
 pub use log::{Log, LogBuilder};
 pub use loopsight_recordings::output::Written;
 pub use model::{Model, ModelValue};

@@ -1,8 +1,11 @@
 //! The parts that are known.
 
+use loopsight_model::model::misfit;
 use loopsight_model::registry;
 
 use crate::answers::{ListAnswer, Listed};
+use crate::error::Result;
+use crate::model;
 
 /// What parts are listed.
 #[derive(Clone, Debug, Default)]
@@ -72,6 +75,36 @@ pub fn list(options: &ListOptions) -> ListAnswer {
     ListAnswer::new(all().into_iter().filter(wanted).collect())
 }
 
+/// The effects that fit a plant, each with the channels it can act on.
+///
+/// ```
+/// let fitting = loopsight::effects_for("dc_axis")?;
+/// let friction = fitting.parts.iter().find(|part| part.id == "coulomb_friction");
+/// assert_eq!(friction.map(|part| part.at.as_slice()), Some(&["shaft"][..]));
+/// assert!(!fitting.parts.iter().any(|part| part.id == "scrub_friction"));
+/// # Ok::<(), loopsight::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// There is no such plant.
+pub fn effects_for(plant: &str) -> Result<ListAnswer> {
+    let plant = model::plant(plant)?;
+    let effects = registry::effects();
+    let fitting = effects.iter().filter_map(|effect| {
+        let channels = plant.channels.iter();
+        let at = channels.filter(|channel| misfit(channel, effect).is_none());
+        let at: Vec<&str> = at.map(|channel| channel.id).collect();
+        (!at.is_empty()).then_some(Listed {
+            role: PartRole::Effect.name(),
+            id: effect.id,
+            summary: effect.summary,
+            at,
+        })
+    });
+    Ok(ListAnswer::new(fitting.collect()))
+}
+
 fn all() -> Vec<Listed> {
     let plants = registry::plants();
     let plants = plants.iter().map(|m| ("plant", m.id, m.summary));
@@ -82,7 +115,12 @@ fn all() -> Vec<Listed> {
     let mut parts: Vec<Listed> = plants
         .chain(effects)
         .chain(others)
-        .map(|(role, id, summary)| Listed { role, id, summary })
+        .map(|(role, id, summary)| Listed {
+            role,
+            id,
+            summary,
+            at: Vec::new(),
+        })
         .collect();
     // Those that a model file defines stand behind the library's own.
     let roles = ["plant", "effect"];

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use loopsight_core::PlantMeta;
 use loopsight_model::config::{TomlSource, nearest, read_text};
 use loopsight_model::model::{Model as Composed, ModelParameter};
 use loopsight_model::registry;
@@ -106,19 +107,7 @@ impl Model {
     ///
     /// There is no such plant.
     pub fn of_plant(id: &str) -> Result<Self> {
-        let plants = registry::plants();
-        let ids = || plants.iter().map(|meta| meta.id);
-        if !ids().any(|known| known == id) {
-            let mut message = format!("there is no plant `{id}`");
-            match nearest(id, ids()) {
-                Some(near) => message.push_str(&format!("; did you mean `{near}`?")),
-                None => {
-                    let known: Vec<&str> = ids().collect();
-                    message.push_str(&format!("; known are {}", known.join(", ")));
-                }
-            }
-            return Err(Error::request(message));
-        }
+        plant(id)?;
         Self::from_toml(&format!("the plant `{id}`"), &format!("[plant.{id}]\n"))
     }
 
@@ -200,6 +189,24 @@ impl Model {
     pub(crate) fn source(&self) -> Result<TomlSource> {
         Ok(TomlSource::parse(&self.file, &self.text)?)
     }
+}
+
+/// The plant of this id.
+pub(crate) fn plant(id: &str) -> Result<&'static PlantMeta> {
+    let plants = registry::plants();
+    if let Some(meta) = plants.iter().find(|meta| meta.id == id) {
+        return Ok(meta);
+    }
+    let ids = || plants.iter().map(|meta| meta.id);
+    let mut message = format!("there is no plant `{id}`");
+    match nearest(id, ids()) {
+        Some(near) => message.push_str(&format!("; did you mean `{near}`?")),
+        None => {
+            let known: Vec<&str> = ids().collect();
+            message.push_str(&format!("; known are {}", known.join(", ")));
+        }
+    }
+    Err(Error::request(message))
 }
 
 /// Whether the parts that are linked can be told apart by their ids.

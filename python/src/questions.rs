@@ -47,8 +47,19 @@ pub(crate) fn explain(py: Python<'_>, id: &str) -> PyResult<Answer> {
 
 /// What can be composed.
 #[pyfunction]
-#[pyo3(signature = (role=None))]
-pub(crate) fn parts(py: Python<'_>, role: Option<&str>) -> PyResult<Answer> {
+#[pyo3(signature = (role=None, plant=None))]
+pub(crate) fn parts(
+    py: Python<'_>,
+    role: Option<&str>,
+    plant: Option<&str>,
+) -> PyResult<Answer> {
+    if let (None | Some("effect"), Some(plant)) = (role, plant) {
+        let answer = loopsight::effects_for(plant);
+        return plain(py, &answer.map_err(|error| raised(py, &error))?);
+    }
+    if plant.is_some() {
+        return Err(refused(py, "only effects are listed for a plant"));
+    }
     let mut options = ListOptions::default();
     if let Some(name) = role {
         let Some(role) = PartRole::ALL.into_iter().find(|role| role.name() == name) else {

@@ -141,6 +141,8 @@ def test_what_goes_in_comes_out_also_through_a_file(
         (lambda: ls.fit(MODEL, LOG, method="newton"), "expected `output-error` or `rls`"),
         (lambda: ls.experiment(MODEL, pin="mass", is_there="backlash"), "answers one question"),
         (lambda: ls.parts("wheel"), "expected one of plant, effect"),
+        (lambda: ls.parts("driver", plant="ddmr"), "only effects"),
+        (lambda: ls.parts(plant="ddrm"), "did you mean `ddmr`?"),
         (lambda: ls.simulate(MODEL), "a file, or a text"),
     ],
 )
@@ -161,6 +163,9 @@ def test_an_error_has_its_place() -> None:
 
 def test_parts_explain_themselves() -> None:
     assert "oscillator" in [part.id for part in ls.parts("plant").parts]
+    fitting = {part.id: part.at for part in ls.parts(plant="dc_axis").parts}
+    assert fitting["coulomb_friction"] == ["shaft"] and "scrub_friction" not in fitting
+    assert "mistake" in str(ls.check(HIDDEN / "truth.toml")) and "oscillator" in str(ls.check(MODEL))
     assert ls.explain("coulomb_friction").to_dict()["schema"].startswith("loopsight/explain/")
     assert ls.check(MODEL).to_dict()["schema"].startswith("loopsight/check/")
     told = ls.inspect(LOG).to_dict()

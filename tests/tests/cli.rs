@@ -154,6 +154,18 @@ fn a_list_names_everything_that_is_linked() {
             "{id}: {text}"
         );
     }
+    let fitting = desk.done(&["list", "effects", "--for", "dc_axis"]);
+    assert!(fitting.contains("coulomb_friction") && fitting.contains("  at shaft\n"));
+    assert!(!fitting.contains("scrub_friction"), "it is about turning");
+    let wrong = desk.run(&["list", "--for", "dc_axes"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("did you mean `dc_axis`?"));
+    assert_eq!(
+        desk.run(&["list", "drivers", "--for", "ddmr"])
+            .status
+            .code(),
+        Some(2)
+    );
     let only = desk.done(&["list", "plants"]);
     assert!(
         only.contains("ddmr") && !only.contains("coulomb_friction"),

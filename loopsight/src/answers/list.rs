@@ -27,6 +27,9 @@ pub struct Listed {
     pub id: &'static str,
     /// One sentence.
     pub summary: &'static str,
+    /// Where a plant was asked for: the channels that an effect can act on.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub at: Vec<&'static str>,
 }
 
 impl Answer for ListAnswer {

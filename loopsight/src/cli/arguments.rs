@@ -137,6 +137,9 @@ pub(crate) struct ListArguments {
     /// Only these: plants, effects, estimators, controllers or drivers.
     #[arg(value_enum)]
     pub(crate) role: Option<RoleName>,
+    /// Only the effects that fit this plant, each with the channels it can act on.
+    #[arg(long = "for", value_name = "PLANT")]
+    pub(crate) plant: Option<String>,
     /// JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,

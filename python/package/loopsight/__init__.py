@@ -64,7 +64,8 @@ __version__ = "0.1.0"
 
 
 def check(*files: str | PathLike[str]) -> Result:
-    """Whether model, loop and experiment files say what can be: ``mistakes`` with line and column."""
+    """Whether model, loop, experiment and log files are right: ``files``, each with ``summary`` and ``mistake``
+    (line and column)."""
     return Result(_engine.check(list(files)))
 
 
@@ -73,7 +74,7 @@ def explain(id: str) -> Result:
     return Result(_engine.explain(id))
 
 
-def parts(role: str | None = None) -> Result:
+def parts(role: str | None = None, *, plant: str | None = None) -> Result:
     """What can be composed: all, or those of a role (``"plant"``, ``"effect"``, ``"estimator"``,
-    ``"controller"``, ``"driver"``)."""
-    return Result(_engine.parts(role))
+    ``"controller"``, ``"driver"``). With `plant` the effects that fit it, each with its channels."""
+    return Result(_engine.parts(role, plant))

@@ -61,7 +61,7 @@ class Result:
         return [*super().__dir__(), *self._data]
 
     def __str__(self) -> str:
-        return str(self._data.get("summary", ""))
+        return str(self._data.get("summary") or self.to_json())
 
     def __repr__(self) -> str:
         return f"<loopsight.{type(self).__name__}: {self}>"

@@ -3,8 +3,8 @@
 use crate::answers::{Answer as _, ListAnswer};
 use crate::cli::arguments::{ListArguments, RoleName};
 use crate::cli::output;
-use crate::error::Result;
-use crate::{ListOptions, PartRole, list};
+use crate::error::{Error, Result};
+use crate::{ListOptions, PartRole, effects_for, list};
 
 pub(crate) fn run(arguments: &ListArguments) -> Result<()> {
     let role = arguments.role.map(|role| match role {
@@ -14,7 +14,15 @@ pub(crate) fn run(arguments: &ListArguments) -> Result<()> {
         RoleName::Controllers => PartRole::Controller,
         RoleName::Drivers => PartRole::Driver,
     });
-    let answer = list(&ListOptions { role });
+    let answer = match &arguments.plant {
+        None => list(&ListOptions { role }),
+        Some(plant) if matches!(role, None | Some(PartRole::Effect)) => effects_for(plant)?,
+        Some(plant) => {
+            return Err(Error::request(format!(
+                "`--for {plant}` lists the effects that fit a plant: `loopsight list effects --for {plant}`"
+            )));
+        }
+    };
     output::result(&if arguments.json {
         answer.to_json()?
     } else {
@@ -36,6 +44,9 @@ fn text(answer: &ListAnswer) -> String {
             text.push(format!("{role}s"));
         }
         text.push(format!("  {:width$}  {}", part.id, part.summary));
+        if !part.at.is_empty() {
+            text.push(format!("  {:width$}    at {}", "", part.at.join(", ")));
+        }
     }
     text.push("\n`loopsight explain ID` tells more.".to_owned());
     text.join("\n")

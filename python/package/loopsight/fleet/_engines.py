@@ -7,6 +7,8 @@ import importlib.util
 import multiprocessing
 import os
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -28,6 +30,18 @@ TASKS_PER_WORKER = 200
 FRESH: dict[str, Any] = {"max_tasks_per_child": TASKS_PER_WORKER} if sys.version_info >= (3, 11) else {}
 
 
+def leave_with(parent: int) -> None:
+    """Begins a worker: it ends when the process `parent` is gone. A pool's workers do not see that for themselves,
+    since each holds both ends of the queue it waits at."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
 def processes(work: Work, tasks: Sequence[Any], workers: int, retries: int) -> Iterator[Done]:
     """The process pool of the standard library.
 
@@ -43,6 +57,8 @@ def processes(work: Work, tasks: Sequence[Any], workers: int, retries: int) -> I
         with ProcessPoolExecutor(
             max_workers=1 if alone else workers,
             mp_context=multiprocessing.get_context("spawn"),
+            initializer=leave_with,
+            initargs=(os.getpid(),),
             **FRESH,
         ) as pool:
             try:
