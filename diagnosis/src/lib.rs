@@ -61,8 +61,8 @@
 //! # Features
 //!
 //! None: the crate needs `std`, and builds for `wasm32-unknown-unknown` as well. The effects that are tried are
-//! those linked into the program. The library of them is `loopsight-plants`; effects of other crates and
-//! expressions in the model file are tried as well.
+//! those linked into the program. The library of them is `loopsight-plants`; effects of other crates are tried as
+//! well. An expression in the model file is a part of the model: it is fitted with whatever is tried beside it.
 
 mod advice;
 mod arrive;

@@ -14,12 +14,16 @@ use crate::answers::{
 use crate::error::{Error, Result};
 
 /// Explains a plant, an effect, an estimator, a controller or a driver by its id: equation, parameters,
-/// channels, reference, example. `log`, `fit` and `simulation` are the tables of a model file, with their keys.
+/// channels, reference, example. `log`, `fit` and `simulation` are the tables of a model file, with their keys. The role
+/// may stand before the id, as in the file: of the two parts `expression`, `effect.expression` is the effect.
 ///
 /// ```
 /// let answer = loopsight::explain("coulomb_friction")?;
 /// assert_eq!(answer.parts[0].role, "effect");
 /// assert_eq!(answer.parts[0].parameters[0].id, "level");
+/// let own = loopsight::explain("effect.expression")?;
+/// assert_eq!((own.parts.len(), own.parts[0].role), (1, "effect"));
+/// assert!(loopsight::explain("plant.coulomb_friction").is_err());
 /// # Ok::<(), loopsight::Error>(())
 /// ```
 ///
@@ -51,6 +55,15 @@ pub fn explain(id: &str) -> Result<ExplainAnswer> {
     }
     if let Some(meta) = tables::TABLES.iter().find(|m| m.id == id) {
         return Ok(ExplainAnswer::new(vec![part(meta)]));
+    }
+    if let Some((role, id)) = id.split_once('.')
+        && !id.contains('.')
+        && let Ok(ExplainAnswer { parts, .. }) = explain(id)
+    {
+        let found: Vec<Explained> = parts.into_iter().filter(|p| p.role == role).collect();
+        if !found.is_empty() {
+            return Ok(ExplainAnswer::new(found));
+        }
     }
     let mut ids: Vec<&str> = plants.iter().map(|m| m.id).collect();
     ids.extend(effects.iter().map(|m| m.id));
