@@ -1,6 +1,7 @@
 //! Improving a model: diagnose, add the missing effect, refit, until nothing more is missing.
 
 use crate::conclusion::{Conclusion, Diagnosis, Explanation};
+use crate::criteria::Criteria;
 use crate::diagnose::diagnose_above;
 use crate::error::FitError;
 use crate::fit::fit;
@@ -8,7 +9,7 @@ use crate::fitted::Fit;
 use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
 use crate::progress::{Cancelled, Work};
-use crate::refine::{refine, still_open, without_undetermined};
+use crate::refine::{blurs, is_undetermined, refine, still_open, take_values, without_step};
 use crate::settings::{FitSettings, Method};
 use loopsight_model::model::Model;
 
@@ -47,6 +48,8 @@ pub fn improve(
 /// An improvement in progress.
 struct State {
     present: Model,
+    /// What it was before the last step: the fit without that step begins there.
+    before: Option<Model>,
     steps: Vec<ImprovementStep>,
     diagnoses: Vec<Diagnosis>,
 }
@@ -55,6 +58,7 @@ impl State {
     fn new(model: &Model) -> Self {
         Self {
             present: model.clone(),
+            before: None,
             steps: Vec::new(),
             diagnoses: Vec::new(),
         }
@@ -102,7 +106,7 @@ impl State {
             nrmse_test: best.nrmse,
             still_open: Vec::new(),
         });
-        self.present = best.model;
+        self.before = Some(std::mem::replace(&mut self.present, best.model));
         let earlier = &self.diagnoses[..round];
         let work = work.in_round(round);
         refine(
@@ -128,30 +132,49 @@ impl State {
         Ok(())
     }
 
-    /// The present model fitted to all of the log. A last step goes while the log does not say how strong its effect
-    /// is and the unseen error hardly fell with it: there is some effect for every imperfection, and it would take
-    /// their values from the parameters that the log does determine.
+    /// The present model fitted to all of the log. A last step goes
+    ///
+    /// * while the log does not say how strong its effect is and the unseen error hardly fell with it: there is some
+    ///   effect for every imperfection, and it would take their values from the parameters that the log does determine;
+    /// * while something is missing with it, too, and it blurs what the log said of an earlier effect.
     fn settled(
         &mut self,
         measurements: &Measurements<'_>,
         settings: &FitSettings,
         work: &Work<'_>,
     ) -> Result<Fit, FitError> {
-        let criteria = work.criteria();
-        let (better, undetermined) = (criteria.improve.better, criteria.missing.undetermined);
+        let Criteria {
+            improve, missing, ..
+        } = work.criteria();
+        let floor = self.diagnoses.last().map_or(0.0, |d| d.floor.nrmse);
+        let mut present = fit(&self.present, measurements, settings, work)?;
         loop {
-            let fit = fit(&self.present, measurements, settings, work)?;
             let [.., before, last] = &self.steps[..] else {
-                return Ok(fit);
+                return Ok(present);
             };
-            if fit.cancelled || last.nrmse_test < better * before.nrmse_test {
-                return Ok(fit);
+            let fell_to = last.nrmse_test / before.nrmse_test;
+            let hardly = fell_to >= improve.better;
+            let incomplete = last.nrmse_test > missing.above_floor * floor;
+            if present.cancelled || !hardly && (fell_to < improve.worth_blurring || !incomplete) {
+                return Ok(present);
             }
-            let Some(without) = without_undetermined(&fit, last, undetermined) else {
-                return Ok(fit);
+            let Some(mut without) = without_step(&present.model, last) else {
+                return Ok(present);
             };
+            if let Some(before) = self.before.take() {
+                take_values(&mut without, &before);
+            }
+            let undetermined = hardly && is_undetermined(&present, last, missing.undetermined);
+            if !undetermined && !incomplete {
+                return Ok(present);
+            }
+            let alone = fit(&without, measurements, settings, work)?;
+            if !undetermined && !blurs(&alone, &present, missing.undetermined, improve.blurs) {
+                return Ok(present);
+            }
             self.present = without;
             self.steps.pop();
+            present = alone;
         }
     }
 

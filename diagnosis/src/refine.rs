@@ -63,28 +63,59 @@ fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<
     }
 }
 
-/// The fitted model without the effect of `step`, where the log does not say how strong that effect is; none
-/// where it does.
-pub(crate) fn without_undetermined(
-    fit: &Fit,
-    step: &ImprovementStep,
-    undetermined: f64,
-) -> Option<Model> {
+/// Whether the log does not say how strong the effect of `step` is.
+pub(crate) fn is_undetermined(fit: &Fit, step: &ImprovementStep, undetermined: f64) -> bool {
     let model = &fit.model;
-    let instances = instances(model, step.added.as_ref()?);
-    let of_effect = |i: &usize| {
-        let effect = &model.effects[*i];
+    let Some(place) = step.added.as_ref() else {
+        return false;
+    };
+    let of_effect = |i: usize| {
+        let effect = &model.effects[i];
         let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
         model.parameters[own].iter()
     };
-    let estimated = instances
-        .iter()
-        .flat_map(of_effect)
+    let estimated = (instances(model, place).into_iter().flat_map(of_effect))
         .filter_map(|p| Some((p, fit.parameters.get(&p.name)?)));
-    if instances.is_empty() || strength_is_determined(estimated, undetermined) {
-        return None;
+    !strength_is_determined(estimated, undetermined)
+}
+
+/// Whether an added effect takes from the log what it said of another one: a parameter of an effect that was determined
+/// in the fit `alone` has at least `times` the standard error in the fit `with` the added one.
+pub(crate) fn blurs(alone: &Fit, with: &Fit, undetermined: f64, times: f64) -> bool {
+    let effects = alone.model.effects.iter();
+    let mut names = effects.flat_map(|effect| {
+        let parameters = alone.model.parameters.iter().skip(effect.first_parameter);
+        parameters.take(effect.meta.parameters.len())
+    });
+    names.any(|parameter| {
+        let estimates = [alone, with].map(|fit| fit.parameters.get(&parameter.name));
+        let [Some(before), Some(after)] = estimates else {
+            return false;
+        };
+        let Some(error) = before
+            .std_error
+            .filter(|_| before.is_determined(undetermined))
+        else {
+            return false;
+        };
+        after
+            .std_error
+            .is_none_or(|blurred| blurred >= times * error)
+    })
+}
+
+/// The model without the effect of `step`; none where it has none of it.
+pub(crate) fn without_step(model: &Model, step: &ImprovementStep) -> Option<Model> {
+    let instances = instances(model, step.added.as_ref()?);
+    (!instances.is_empty()).then(|| without(model, &instances))?
+}
+
+/// Gives the parameters of `model` the values that those of the same name have in `other`.
+pub(crate) fn take_values(model: &mut Model, other: &Model) {
+    for parameter in &mut model.parameters {
+        let same = other.parameters.iter().find(|p| p.name == parameter.name);
+        parameter.value = same.and_then(|p| p.value).or(parameter.value);
     }
-    without(model, &instances)
 }
 
 /// The model without some of its effects.

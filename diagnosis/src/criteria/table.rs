@@ -189,6 +189,10 @@ criteria! {
         simpler: f64 = 1.02 "1", Judgement: "one parameter less is worth two per cent";
         /// Ratio of errors below which another effect takes the place of one that it could not be told from.
         better: f64 = 0.9 "1", Judgement: "a smaller gain may come from what else is missing";
+        /// While more is missing, an added effect goes if a parameter of an earlier one has this multiple of its standard error with it.
+        blurs: f64 = 2.0 "1", Judgement: "three quarters of what the log said of it are gone";
+        /// Ratio of errors below which it stays all the same.
+        worth_blurring: f64 = 0.7 "1", Judgement: "a third of the error cannot come from trading one effect for another";
         /// The smoothing width of a sign is halved if the ratio of errors is below this.
         sharper: f64 = 0.99 "1", Judgement: "one per cent";
     }
