@@ -80,7 +80,7 @@ pub fn list(options: &ListOptions) -> ListAnswer {
 /// ```
 /// let fitting = loopsight::effects_for("dc_axis")?;
 /// let friction = fitting.parts.iter().find(|part| part.id == "coulomb_friction");
-/// assert_eq!(friction.map(|part| part.at.as_slice()), Some(&["shaft"][..]));
+/// assert_eq!(friction.map(|part| part.at.as_slice()), Some(&["shaft", "load"][..]));
 /// assert!(!fitting.parts.iter().any(|part| part.id == "scrub_friction"));
 /// # Ok::<(), loopsight::Error>(())
 /// ```

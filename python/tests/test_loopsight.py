@@ -164,7 +164,7 @@ def test_an_error_has_its_place() -> None:
 def test_parts_explain_themselves() -> None:
     assert "oscillator" in [part.id for part in ls.parts("plant").parts]
     fitting = {part.id: part.at for part in ls.parts(plant="dc_axis").parts}
-    assert fitting["coulomb_friction"] == ["shaft"] and "scrub_friction" not in fitting
+    assert fitting["coulomb_friction"] == ["shaft", "load"] and "scrub_friction" not in fitting
     assert "mistake" in str(ls.check(HIDDEN / "truth.toml")) and "oscillator" in str(ls.check(MODEL))
     assert ls.explain("coulomb_friction").to_dict()["schema"].startswith("loopsight/explain/")
     assert ls.check(MODEL).to_dict()["schema"].startswith("loopsight/check/")
