@@ -48,11 +48,7 @@ pub(crate) fn explain(py: Python<'_>, id: &str) -> PyResult<Answer> {
 /// What can be composed.
 #[pyfunction]
 #[pyo3(signature = (role=None, plant=None))]
-pub(crate) fn parts(
-    py: Python<'_>,
-    role: Option<&str>,
-    plant: Option<&str>,
-) -> PyResult<Answer> {
+pub(crate) fn parts(py: Python<'_>, role: Option<&str>, plant: Option<&str>) -> PyResult<Answer> {
     if let (None | Some("effect"), Some(plant)) = (role, plant) {
         let answer = loopsight::effects_for(plant);
         return plain(py, &answer.map_err(|error| raised(py, &error))?);
