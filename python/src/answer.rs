@@ -1,5 +1,6 @@
 //! What the engine answers, of whatever kind.
 
+use loopsight::Watch;
 use loopsight::answers::{
     AddAnswer, CompareAnswer, DiagnoseAnswer, ExperimentAnswer, FitAnswer, ImproveAnswer,
     RunAnswer, Series, SeriesOf, SimulateAnswer,
@@ -11,6 +12,7 @@ use pyo3::types::PyDict;
 use crate::error::{raised, refused};
 use crate::log::Log;
 use crate::model::Model;
+use crate::watched::watched;
 
 /// Makes the page of an answer; the argument stands at its foot.
 type Page = dyn Fn(&str) -> String + Send + Sync;
@@ -139,42 +141,27 @@ fn taken(of: &mut Option<Vec<Series>>, keep: bool) -> Option<Vec<Series>> {
     if keep { of.clone() } else { of.take() }
 }
 
-impl IntoAnswer for CompareAnswer {
-    fn into_answer(mut self, series: bool) -> loopsight::Result<Answer> {
-        let series = taken(&mut self.series, series);
-        Ok(Answer::plain(&self)?
-            .with_series(series)
-            .with_page(move |command| self.page(command)))
-    }
+/// Answers with series and a page, and with the model that `$model` finds in them.
+macro_rules! pictured {
+    ($($answer:ident: $model:expr;)*) => {$(
+        impl IntoAnswer for $answer {
+            fn into_answer(mut self, series: bool) -> loopsight::Result<Answer> {
+                let series = taken(&mut self.series, series);
+                let model: fn(&$answer) -> Option<&loopsight::Model> = $model;
+                let plain = Answer::plain(&self)?.with_model(model(&self));
+                Ok(plain
+                    .with_series(series)
+                    .with_page(move |command| self.page(command)))
+            }
+        }
+    )*};
 }
 
-impl IntoAnswer for FitAnswer {
-    fn into_answer(mut self, series: bool) -> loopsight::Result<Answer> {
-        let series = taken(&mut self.series, series);
-        let plain = Answer::plain(&self)?.with_model(Some(self.model()));
-        Ok(plain
-            .with_series(series)
-            .with_page(move |command| self.page(command)))
-    }
-}
-
-impl IntoAnswer for DiagnoseAnswer {
-    fn into_answer(mut self, series: bool) -> loopsight::Result<Answer> {
-        let series = taken(&mut self.series, series);
-        Ok(Answer::plain(&self)?
-            .with_series(series)
-            .with_page(move |command| self.page(command)))
-    }
-}
-
-impl IntoAnswer for ImproveAnswer {
-    fn into_answer(mut self, series: bool) -> loopsight::Result<Answer> {
-        let series = taken(&mut self.series, series);
-        let plain = Answer::plain(&self)?.with_model(self.model());
-        Ok(plain
-            .with_series(series)
-            .with_page(move |command| self.page(command)))
-    }
+pictured! {
+    CompareAnswer: |_| None;
+    FitAnswer: |answer| Some(answer.model());
+    DiagnoseAnswer: |_| None;
+    ImproveAnswer: |answer| answer.model();
 }
 
 impl IntoAnswer for RunAnswer {
@@ -208,6 +195,17 @@ impl IntoAnswer for ExperimentAnswer {
         }
         Ok(plain.with_log(inputs.build()?))
     }
+}
+
+/// Long work, watched, and its answer as Python gets it.
+pub(crate) fn long<A: IntoAnswer + Send>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    series: bool,
+    work: impl FnOnce(Watch) -> loopsight::Result<A> + Send,
+) -> PyResult<Answer> {
+    let answer = watched(py, progress, work)?;
+    answered(py, Ok(answer), series)
 }
 
 /// An answer of the library as Python gets it.

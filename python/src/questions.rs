@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use loopsight::{InspectOptions, ListOptions, LogTo, Loop, PartRole, RunOptions, Session};
 use pyo3::prelude::*;
 
-use crate::answer::{Answer, answered};
+use crate::answer::{Answer, long};
 use crate::error::{raised, refused};
 use crate::log::Log;
-use crate::watched::watched;
 
-fn plain(py: Python<'_>, answer: &impl loopsight::Answer) -> PyResult<Answer> {
-    Answer::plain(answer).map_err(|error| raised(py, &error))
+fn plain<A: loopsight::Answer>(py: Python<'_>, answer: loopsight::Result<A>) -> PyResult<Answer> {
+    answer
+        .and_then(|answer| Answer::plain(&answer))
+        .map_err(|error| raised(py, &error))
 }
 
 /// What is in a log, and which plants could fit it.
@@ -29,20 +30,13 @@ pub(crate) fn inspect(
     }
     options = inputs.into_iter().fold(options, InspectOptions::input);
     options = outputs.into_iter().fold(options, InspectOptions::measure);
-    let answer = py.detach(|| loopsight::inspect(&log.0, &options));
-    match answer {
-        Ok(answer) => plain(py, &answer),
-        Err(error) => Err(raised(py, &error)),
-    }
+    plain(py, py.detach(|| loopsight::inspect(&log.0, &options)))
 }
 
 /// Everything about a part: equation, parameters, where it fits.
 #[pyfunction]
 pub(crate) fn explain(py: Python<'_>, id: &str) -> PyResult<Answer> {
-    match loopsight::explain(id) {
-        Ok(answer) => plain(py, &answer),
-        Err(error) => Err(raised(py, &error)),
-    }
+    plain(py, loopsight::explain(id))
 }
 
 /// What can be composed.
@@ -50,8 +44,7 @@ pub(crate) fn explain(py: Python<'_>, id: &str) -> PyResult<Answer> {
 #[pyo3(signature = (role=None, plant=None))]
 pub(crate) fn parts(py: Python<'_>, role: Option<&str>, plant: Option<&str>) -> PyResult<Answer> {
     if let (None | Some("effect"), Some(plant)) = (role, plant) {
-        let answer = loopsight::effects_for(plant);
-        return plain(py, &answer.map_err(|error| raised(py, &error))?);
+        return plain(py, loopsight::effects_for(plant));
     }
     if plant.is_some() {
         return Err(refused(py, "only effects are listed for a plant"));
@@ -68,13 +61,13 @@ pub(crate) fn parts(py: Python<'_>, role: Option<&str>, plant: Option<&str>) -> 
         };
         options = options.role(role);
     }
-    plain(py, &loopsight::list(&options))
+    plain(py, Ok(loopsight::list(&options)))
 }
 
 /// Whether files say what can be.
 #[pyfunction]
 pub(crate) fn check(py: Python<'_>, files: Vec<PathBuf>) -> PyResult<Answer> {
-    plain(py, &loopsight::check(files))
+    plain(py, Ok(loopsight::check(files)))
 }
 
 /// Runs a control loop.
@@ -101,6 +94,5 @@ pub(crate) fn run(
             .watch(watch);
         session.run(&control, &options)
     };
-    let answer = watched(py, None, work)?;
-    answered(py, Ok(answer), series)
+    long(py, None, series, work)
 }

@@ -8,11 +8,10 @@ use loopsight::{
 };
 use pyo3::prelude::*;
 
-use crate::answer::{Answer, answered};
+use crate::answer::{Answer, answered, long};
 use crate::error::{raised, refused};
 use crate::log::Log;
 use crate::model::Model;
-use crate::watched::watched;
 
 /// A model and the logs of one machine.
 #[pyclass(frozen, module = "loopsight._engine")]
@@ -79,8 +78,7 @@ impl Session {
             let options = CompareOptions::default().series(true).watch(watch);
             self.0.compare(&options)
         };
-        let answer = watched(py, progress, work)?;
-        answered(py, Ok(answer), series)
+        long(py, progress, series, work)
     }
 
     fn fit(
@@ -113,8 +111,7 @@ impl Session {
             options = options.max_iterations(most);
         }
         let work = |watch| self.0.fit(&options.watch(watch));
-        let answer = watched(py, progress, work)?;
-        answered(py, Ok(answer), series)
+        long(py, progress, series, work)
     }
 
     fn diagnose(
@@ -127,8 +124,7 @@ impl Session {
             let options = DiagnoseOptions::default().series(true).watch(watch);
             self.0.diagnose(&options)
         };
-        let answer = watched(py, progress, work)?;
-        answered(py, Ok(answer), series)
+        long(py, progress, series, work)
     }
 
     fn improve(
@@ -141,8 +137,7 @@ impl Session {
             let options = ImproveOptions::default().series(true).watch(watch);
             self.0.improve(&options)
         };
-        let answer = watched(py, progress, work)?;
-        answered(py, Ok(answer), series)
+        long(py, progress, series, work)
     }
 
     fn add(&self, py: Python<'_>, effect: &str, at: Vec<String>) -> PyResult<Answer> {
@@ -175,8 +170,7 @@ impl Session {
         options.limit = limit;
         options.duration_s = duration_s;
         let work = |watch| self.0.experiment(&options.watch(watch));
-        let answer = watched(py, progress, work)?;
-        answered(py, Ok(answer), false)
+        long(py, progress, false, work)
     }
 
     fn simulate(

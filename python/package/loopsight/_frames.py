@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ._optional import needed
+
 
 def frame(columns: Mapping[str, Any], index: Sequence[str] | None = None) -> Any:
     """A pandas data frame of columns."""
-    try:
-        import pandas
-    except ImportError as missing:
-        raise ImportError("frames need the package pandas: pip install pandas") from missing
+    pandas = needed("frames need", "pandas")
     return pandas.DataFrame(dict(columns), index=None if index is None else list(index))

@@ -87,7 +87,7 @@ class Log:
         table = _table(frame)
         units = dict(units or {})
         chosen = _chosen(table, inputs, outputs)
-        stamps = time if time is not None else _stamps(table, units)
+        stamps = time if time is not None else _stamps(table)
         if stamps is None:
             raise Error(
                 "the frame has no column of time stamps: name one with `time=`, its columns are "
@@ -207,7 +207,7 @@ def _chosen(
     return chosen
 
 
-def _stamps(table: Mapping[str, Any], units: Mapping[str, str]) -> str | None:
+def _stamps(table: Mapping[str, Any]) -> str | None:
     """The column that is named like time stamps."""
     for name in table:
         plain = name.lower()

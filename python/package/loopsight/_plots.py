@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ._optional import needed
+
 #: How each model is called, and its colour: that of the pages.
 MODELS = {
     "model": ("model", "#d55e00"),
@@ -29,10 +31,7 @@ def _title(run: str, signal: str, unit: str) -> str:
 
 def matplotlib(series: Sequence[dict[str, Any]], **options: Any) -> Any:
     """A figure of matplotlib."""
-    try:
-        import matplotlib.pyplot as plt
-    except ImportError as missing:
-        raise ImportError("pictures need the package matplotlib: pip install matplotlib") from missing
+    plt = needed("pictures need", "matplotlib.pyplot")
     rows = _rows(series)
     options.setdefault("figsize", (9.0, 1.0 + 3.0 * max(len(rows), 1)))
     options.setdefault("gridspec_kw", {"height_ratios": [3, 1] * max(len(rows), 1)})
@@ -60,10 +59,7 @@ def matplotlib(series: Sequence[dict[str, Any]], **options: Any) -> Any:
 
 def plotly(series: Sequence[dict[str, Any]], **options: Any) -> Any:
     """A figure of plotly."""
-    try:
-        from plotly.subplots import make_subplots
-    except ImportError as missing:
-        raise ImportError("these pictures need the package plotly: pip install plotly") from missing
+    make_subplots = needed("these pictures need", "plotly.subplots").make_subplots
     rows = _rows(series)
     count = max(len(rows), 1)
     options.setdefault("row_heights", [3.0, 1.0] * count)

@@ -6,8 +6,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from ._optional import needed
+
 Progress = bool | Callable[[str, int, int], object]
 Report = Callable[[str, int, int], object]
+
+
+def bars() -> Any:
+    """Makes a bar."""
+    return needed("progress bars need", "tqdm.auto").tqdm
 
 
 @contextmanager
@@ -24,10 +31,7 @@ def reporting(progress: Progress) -> Iterator[Report | None]:
 
 @contextmanager
 def _bars() -> Iterator[Report]:
-    try:
-        from tqdm.auto import tqdm
-    except ImportError as missing:
-        raise ImportError("progress bars need the package tqdm: pip install tqdm") from missing
+    tqdm = bars()
     bar: Any = None
 
     def report(stage: str, done: int, total: int) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 from . import _engine, _plots
 from ._error import Error
+from ._files import whole
 from ._frames import frame
 from ._log import Log
 from ._model import Model
@@ -92,10 +93,8 @@ class Result:
         """
         page = self._answer.page(self._command)
         target = Path(fspath(path))
-        # Whole or not at all.
-        part = target.with_name(target.name + ".part")
-        part.write_text(page, encoding="utf-8")
-        part.replace(target)
+        with whole(target) as part:
+            part.write_text(page, encoding="utf-8")
         return target
 
     def _repr_html_(self) -> str:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import os
 import time
+from contextlib import nullcontext
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
 from .._error import Error
+from .._files import whole
 from .._model import Model
+from .._optional import needed
+from .._progress import bars
 from .._session import improve as improve_one
 from ._engines import cores, engine_named
 
@@ -81,7 +85,8 @@ def improve(
             log.write(json.dumps(row) + "\n")
             log.flush()
             os.fsync(log.fileno())
-            bar.update(1)
+            if bar is not None:
+                bar.update(1)
             if count % ROWS == 0:
                 _write(pandas, target, found)
                 log.truncate(0)
@@ -210,37 +215,14 @@ def _frame(pandas: Any, found: dict[tuple[Any, ...], dict[str, Any]]) -> Any:
 
 def _write(pandas: Any, target: Path, found: dict[tuple[Any, ...], dict[str, Any]]) -> None:
     """Writes the table of results, whole or not at all."""
-    part = target.with_name(target.name + ".part")
-    _frame(pandas, found).to_parquet(part, index=False)
-    part.replace(target)
-
-
-class _Quiet:
-    def __enter__(self) -> _Quiet:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        return None
-
-    def update(self, _: int) -> None:
-        return None
+    with whole(target) as part:
+        _frame(pandas, found).to_parquet(part, index=False)
 
 
 def _bar(shown: bool, total: int, done: int) -> Any:
-    if not shown:
-        return _Quiet()
-    try:
-        from tqdm.auto import tqdm
-    except ImportError as missing:
-        raise ImportError("progress bars need the package tqdm: pip install tqdm") from missing
-    return tqdm(total=total, initial=done, unit="log")
+    return bars()(total=total, initial=done, unit="log") if shown else nullcontext()
 
 
 def _pandas() -> Any:
-    try:
-        import pandas
-        import pyarrow  # noqa: F401  (pandas writes Parquet with it)
-    except ImportError as missing:
-        raise ImportError("a fleet needs the packages pandas and pyarrow: pip install pandas pyarrow") from missing
-    return pandas
-
+    # pandas writes Parquet with pyarrow.
+    return needed("a fleet needs", "pandas", "pyarrow")
