@@ -83,13 +83,14 @@ pub(crate) fn noise(
     let noise = match sensor {
         Sensor::EncoderCounts(encoder) => encoder.noise(period),
         Sensor::Instantaneous | Sensor::IntervalMean => {
+            let rounding = rounded(&differences[0], tally.rms());
             let orders = differences.into_iter().zip(1..);
             let white = orders
                 .filter(|(sizes, _)| !sizes.is_empty())
                 .map(|(sizes, order)| median(sizes) / 0.6745 / gain(order).sqrt())
                 .fold(f64::INFINITY, f64::min);
             let white = if white.is_finite() { white } else { 0.0 };
-            let white = white.max(rounding(sensor, signal, runs));
+            let white = white.max(rounding);
             let hold = median(holds);
             let age = if hold > criteria.repeats_periods * period {
                 rate.rms() * hold / 12f64.sqrt()
@@ -117,7 +118,7 @@ pub(crate) fn rounding(sensor: &Sensor, signal: usize, runs: &[Run]) -> f64 {
         values.iter().for_each(|y| tally.add(*y, *y));
         changes.extend(difference(&values, 1).map(f64::abs));
     }
-    resolution(&changes, tally.rms()) / 12f64.sqrt()
+    rounded(&changes, tally.rms())
 }
 
 /// Orders of the differences.
@@ -141,14 +142,18 @@ fn gain(order: usize) -> f64 {
     (1..=order).fold(1.0, |all, k| all * (order + k) as f64 / k as f64)
 }
 
-/// The least that a signal of this root mean square changes by: what it is rounded to.
-fn resolution(changes: &[f64], rms: f64) -> f64 {
+/// Standard deviation of rounding to the least that a signal of this root mean square changes by.
+fn rounded(changes: &[f64], rms: f64) -> f64 {
     let least = changes
         .iter()
         .copied()
         .filter(|change| *change > 1e-9 * rms)
         .fold(f64::INFINITY, f64::min);
-    if least.is_finite() { least } else { 0.0 }
+    if least.is_finite() {
+        least / 12f64.sqrt()
+    } else {
+        0.0
+    }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -155,7 +155,9 @@ impl State {
             let fell_to = last.nrmse_test / before.nrmse_test;
             let hardly = fell_to >= improve.better;
             let incomplete = last.nrmse_test > missing.above_floor * floor;
-            if present.cancelled || !hardly && (fell_to < improve.worth_blurring || !incomplete) {
+            let undetermined = hardly && is_undetermined(&present, last, missing.undetermined);
+            let may_blur = incomplete && (hardly || fell_to >= improve.worth_blurring);
+            if present.cancelled || !undetermined && !may_blur {
                 return Ok(present);
             }
             let Some(mut without) = without_step(&present.model, last) else {
@@ -163,10 +165,6 @@ impl State {
             };
             if let Some(before) = self.before.take() {
                 take_values(&mut without, &before);
-            }
-            let undetermined = hardly && is_undetermined(&present, last, missing.undetermined);
-            if !undetermined && !incomplete {
-                return Ok(present);
             }
             let alone = fit(&without, measurements, settings, work)?;
             if !undetermined && !blurs(&alone, &present, missing.undetermined, improve.blurs) {

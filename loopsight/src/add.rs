@@ -2,7 +2,7 @@
 
 use loopsight_core::EffectMeta;
 use loopsight_model::config::nearest;
-use loopsight_model::model::{Model as Composed, misfit};
+use loopsight_model::model::{Model as Composed, fitting_channels, misfit};
 use loopsight_model::registry;
 
 use crate::answers::AddAnswer;
@@ -57,13 +57,7 @@ impl Session {
         let model = &self.model.composed;
         let id = options.effect.as_str();
         let meta = effect(id)?;
-        let fitting: Vec<&str> = model
-            .plant
-            .channels
-            .iter()
-            .filter(|c| misfit(c, meta).is_none())
-            .map(|c| c.id)
-            .collect();
+        let fitting = fitting_channels(model.plant, meta);
         let at: Vec<&str> = if options.at.is_empty() {
             // All channels of the family of the first: both wheels, all inputs.
             let Some(first) = fitting.first() else {

@@ -4,7 +4,7 @@ mod tables;
 
 use loopsight_core::{EffectMeta, Parameter, PlantMeta, Signal};
 use loopsight_model::config::nearest;
-use loopsight_model::model::misfit;
+use loopsight_model::model::{fitting_channels, misfit};
 use loopsight_model::registry::{self, PartMeta, range_text};
 
 use crate::answers::{
@@ -150,12 +150,9 @@ fn plant(meta: &'static PlantMeta) -> Explained {
 
 fn effect(meta: &'static EffectMeta) -> Explained {
     let homes = registry::plants();
-    let homes = homes.iter().map(|p| {
-        let fit = p.channels.iter().filter(|c| misfit(c, meta).is_none());
-        ExplainedHome {
-            plant: p.id,
-            channels: fit.map(|c| c.id).collect(),
-        }
+    let homes = homes.iter().map(|p| ExplainedHome {
+        plant: p.id,
+        channels: fitting_channels(p, meta),
     });
     Explained {
         symptom: Some(meta.symptom),

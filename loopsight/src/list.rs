@@ -1,6 +1,6 @@
 //! The parts that are known.
 
-use loopsight_model::model::misfit;
+use loopsight_model::model::fitting_channels;
 use loopsight_model::registry;
 
 use crate::answers::{ListAnswer, Listed};
@@ -92,9 +92,7 @@ pub fn effects_for(plant: &str) -> Result<ListAnswer> {
     let plant = model::plant(plant)?;
     let effects = registry::effects();
     let fitting = effects.iter().filter_map(|effect| {
-        let channels = plant.channels.iter();
-        let at = channels.filter(|channel| misfit(channel, effect).is_none());
-        let at: Vec<&str> = at.map(|channel| channel.id).collect();
+        let at = fitting_channels(plant, effect);
         (!at.is_empty()).then_some(Listed {
             role: PartRole::Effect.name(),
             id: effect.id,

@@ -188,7 +188,8 @@ pub fn misfit(channel: &Channel, effect: &EffectMeta) -> Option<String> {
         })
 }
 
-fn fitting_channels(plant: &PlantMeta, effect: &EffectMeta) -> Vec<&'static str> {
+/// The channels of a plant that an effect can act on.
+pub fn fitting_channels(plant: &PlantMeta, effect: &EffectMeta) -> Vec<&'static str> {
     plant
         .channels
         .iter()

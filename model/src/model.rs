@@ -13,7 +13,7 @@ use std::path::Path;
 use loopsight_core::{Derived, Parameter, Place, PlantMeta};
 
 use crate::attach::{attach, make_names_unique};
-pub use crate::attach::{misfit, unit_at};
+pub use crate::attach::{fitting_channels, misfit, unit_at};
 use crate::config::{ConfigError, PathSegment, TomlSource, nearest, read_text};
 use crate::log_map::{ColumnMap, Hold, LogMap};
 pub use crate::pseudo_inverse::pseudo_inverse;

@@ -97,14 +97,9 @@ impl<S: HostReal> Simulator<'_, S> {
             self.x.clone_from(&kept.before);
             steps = (2 * steps).min(most);
             self.integrate_by(way, input, span, steps, &mut linearised);
-            if kept.agrees(&self.x) {
-                let fastest = self.fastest(input, span);
-                // The Jacobian is that of the end now.
-                linearised = false;
-                if way.is_stable(span / steps as f64, [kept.fastest, fastest]) {
-                    end = Some(fastest);
-                    break;
-                }
+            end = self.holds(way, &kept, input, span, steps, &mut linearised);
+            if end.is_some() {
+                break;
             }
             if way == Way::Explicit && steps >= STIFF {
                 kept.explicit.clone_from(&self.x);
@@ -113,13 +108,10 @@ impl<S: HostReal> Simulator<'_, S> {
                 kept.coarse.clone_from(&self.x);
                 self.x.clone_from(&kept.before);
                 self.integrate_by(Way::Implicit, input, span, steps, &mut linearised);
-                if kept.agrees(&self.x) {
-                    let fastest = self.fastest(input, span);
-                    linearised = false;
-                    if Way::Implicit.is_stable(span / steps as f64, [kept.fastest, fastest]) {
-                        (way, end) = (Way::Implicit, Some(fastest));
-                        break;
-                    }
+                end = self.holds(Way::Implicit, &kept, input, span, steps, &mut linearised);
+                if end.is_some() {
+                    way = Way::Implicit;
+                    break;
                 }
                 self.x.clone_from(&kept.explicit);
             }
@@ -164,6 +156,26 @@ impl<S: HostReal> Simulator<'_, S> {
         }
         self.way = way;
         self.integrate(input, span, steps, false);
+    }
+
+    /// Whether so many steps will do: half as many came to the same place, and they are stable. The fastest rate at
+    /// the end then; the Jacobian is the one there if that was asked.
+    fn holds(
+        &mut self,
+        way: Way,
+        kept: &Lengthened<S>,
+        input: &[f64],
+        span: f64,
+        steps: usize,
+        linearised: &mut bool,
+    ) -> Option<f64> {
+        if !kept.agrees(&self.x) {
+            return None;
+        }
+        let fastest = self.fastest(input, span);
+        *linearised = false;
+        way.is_stable(span / steps as f64, [kept.fastest, fastest])
+            .then_some(fastest)
     }
 
     /// The fastest rate of the model where it is now, `elapsed` seconds after the start of the interval: 1/s. The
