@@ -102,14 +102,14 @@ impl Log {
     ///
     /// ```
     /// let log = loopsight::Log::in_memory("bench test")
-    ///     .column("time", "s", [0.0, 0.01, 0.02])
-    ///     .column("voltage", "V", [0.0, 6.0, 6.0])
-    ///     .column("speed", "rpm", [0.0, 12.0, f64::NAN])   // NaN: no sample
+    ///     .column("time", "s", &[0.0, 0.01, 0.02])
+    ///     .column("voltage", "V", &[0.0, 6.0, 6.0])
+    ///     .column("speed", "rpm", &[0.0, 12.0, f64::NAN])   // NaN: no sample
     ///     .build()?;
     /// assert_eq!((log.runs(), log.rows()), (1, 3));
     /// # Ok::<(), loopsight::Error>(())
     /// ```
-    pub fn in_memory(name: &str) -> LogBuilder {
+    pub fn in_memory<'a>(name: &str) -> LogBuilder<'a> {
         LogBuilder::new(name)
     }
 

@@ -37,17 +37,18 @@ impl Log {
         runs: Vec<(String, Columns<'_>)>,
     ) -> PyResult<Self> {
         let mut log = loopsight::Log::in_memory(name);
-        for (run, columns) in runs {
-            log = log.run(&run);
+        for (run, columns) in &runs {
+            log = log.run(run);
             for (column, unit, values) in columns {
-                let values = values.as_array().to_vec();
+                let values = values.as_slice()?;
                 log = match unit {
-                    Some(unit) => log.column(&column, &unit, values),
-                    None => log.header(&column, values),
+                    Some(unit) => log.column(column, unit, values),
+                    None => log.header(column, values),
                 };
             }
         }
-        let log = py.detach(|| log.build());
+        // The lock is kept: nobody changes the arrays while they are copied.
+        let log = log.build();
         log.map(Self).map_err(|error| raised(py, &error))
     }
 

@@ -91,13 +91,14 @@ def test_dates_runs_and_streams() -> None:
     frame = pandas.DataFrame(
         {
             "timestamp": pandas.date_range("2026-01-01", periods=4, freq="250ms"),
-            "day": ["b", "b", "a", "a"],
+            "day": ["b", "a", "b", "a"],
             "speed": pandas.array([1, None, 3, 4], dtype="Int64"),
         }
     )
     log = ls.Log.from_frame(frame, units={"speed": "rad/s"}, run="day")
-    assert log.runs == 2 and log["time_s"].tolist() == [0.0, 0.25, 0.5, 0.75]
-    assert np.isnan(log["speed_rad_per_s"][1])
+    # The runs in the order in which they begin, each with its rows in theirs.
+    assert log.runs == 2 and log["time_s"].tolist() == [0.0, 0.5, 0.25, 0.75]
+    assert np.isnan(log["speed_rad_per_s"][2])
     stream = Stream(pyarrow.table({"time": [0.0, 1.0], "u_V": [1.0, 2.0]}))
     assert ls.Log.from_frame(stream).columns == ["time_s", "u_V"]
 

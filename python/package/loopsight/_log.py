@@ -238,10 +238,15 @@ def _runs(
     """The columns, cut into runs."""
     if run is None:
         return [("", list(columns))]
-    of = np.asarray(table[run])
+    names, first, of = np.unique(np.asarray(table[run]), return_index=True, return_inverse=True)
+    # The rows of each run in one go, as they were: all runs, however many, cost one sort.
+    rows = np.argsort(of, kind="stable")
+    ends = np.cumsum(np.bincount(of, minlength=len(names)))
     # In the order in which they begin.
-    _, first = np.unique(of, return_index=True)
     return [
-        (str(of[k]), [(name, unit, values[of == of[k]]) for name, unit, values in columns])
-        for k in sorted(first)
+        (
+            str(names[k]),
+            [(name, unit, values[rows[ends[k - 1] if k else 0 : ends[k]]]) for name, unit, values in columns],
+        )
+        for k in np.argsort(first)
     ]
