@@ -1,10 +1,23 @@
-"""A fleet: the logs of many robots, on an engine that is there already.
+"""A fleet: the logs of many robots, on an engine that is there already, and what they say together.
 
 >>> import loopsight as ls                                          # doctest: +SKIP
->>> ls.fleet.improve("logs.parquet", "model.toml", out="found.parquet")     # doctest: +SKIP
+>>> found = ls.fleet.improve("logs.parquet", "model.toml", out="found.parquet")     # doctest: +SKIP
+>>> ls.fleet.report(found, "fleet.html")                            # doctest: +SKIP
 """
 
 from ._engines import ENGINES, engine_named
 from ._improve import effects, improve
+from ._report import report
+from ._statistics import missing, readings, siblings, trends
 
-__all__ = ["ENGINES", "effects", "engine_named", "improve"]
+__all__ = [
+    "ENGINES",
+    "effects",
+    "engine_named",
+    "improve",
+    "missing",
+    "readings",
+    "report",
+    "siblings",
+    "trends",
+]

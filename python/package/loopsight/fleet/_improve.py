@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import platform
+import re
 import time
 from contextlib import nullcontext
 from os import PathLike, fspath
@@ -29,6 +32,7 @@ def improve(
     model: Model | str | PathLike[str],
     *,
     out: str | PathLike[str],
+    pages: str | PathLike[str] | None = None,
     engine: str | None = None,
     workers: int | None = None,
     retries: int = 2,
@@ -49,6 +53,9 @@ def improve(
         The model of these robots.
     out : path
         The Parquet file with the results.
+    pages : path, optional
+        A folder for the page of each log, which the command would write with ``--html``: about 0.6 MB each. Logs
+        that an earlier call has done without it get none.
     engine : {"ray", "dask", "processes"}, optional
         What runs the tasks: by default the first of these that is installed.
     workers : int, optional
@@ -64,7 +71,9 @@ def improve(
         A row for each log: ``robot``, ``time``, ``path``; ``status`` (``done`` or ``fault``), ``fault``;
         ``verdict``, ``summary``; ``nrmse_before``, ``nrmse_after`` (free run on validation data, as a share of the
         standard deviation); ``effects`` (``effect@channel+channel``, separated by ``; ``); ``parameters`` (JSON:
-        value, unit, standard error, interval and verdict of each); ``seconds`` that it took.
+        value, unit, standard error, interval and verdict of each); ``page``, where one was written; ``seconds`` that
+        it took, ``cpu_seconds`` of a processor, ``worker`` that did it (machine and process), and ``memory_mb``, the
+        most that this worker ever held (known on Linux alone).
     """
     pandas = _pandas()
     rows = _tasks(pandas, table)
@@ -74,7 +83,13 @@ def improve(
     found = _before(pandas, target, journal)
     text, name = known.to_toml(), known._engine.file
     pending = [row for row in rows if _key(row) not in found]
-    tasks = [{"row": row, "toml": text, "model": name} for row in pending]
+    folder = None if pages is None else Path(fspath(pages)).absolute()
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    tasks = [
+        {"row": row, "toml": text, "model": name, "page": None if folder is None else str(folder / _page_of(row))}
+        for row in pending
+    ]
     run = engine_named(engine)
     with journal.open("a", encoding="utf-8") as log, _bar(progress, len(rows), len(found)) as bar:
         results = run(_task, tasks, workers or cores(), retries)
@@ -126,14 +141,19 @@ def effects(results: Any) -> Any:
 
 def _task(task: dict[str, Any]) -> dict[str, Any]:
     """One log: a row in any case."""
-    begun = time.perf_counter()
+    # Each log is a task on a processor of its own: threads within it would only wait for each other.
+    os.environ.setdefault("RAYON_NUM_THREADS", "1")
+    begun, work = time.perf_counter(), time.process_time()
     row: dict[str, Any] = {**task["row"], "status": "done", "fault": None}
     try:
         model = Model.from_toml(task["toml"], task["model"])
-        answer = improve_one(model, task["row"]["path"]).to_dict()
+        improved = improve_one(model, task["row"]["path"])
+        if task.get("page"):
+            row["page"] = str(improved.report(task["page"]))
     except Error as error:
         row |= {"status": "fault", "fault": str(error)}
     else:
+        answer = improved.to_dict()
         steps = answer["steps"]
         added = [step["added"] for step in steps if step["added"] is not None]
         row |= {
@@ -147,8 +167,29 @@ def _task(task: dict[str, Any]) -> dict[str, Any]:
         if not steps:
             faults = [fault["detail"] for fault in answer["faults"]]
             row |= {"status": "fault", "fault": "; ".join(faults) or answer["summary"]}
-    row["seconds"] = time.perf_counter() - begun
-    return row
+    return row | {
+        "seconds": time.perf_counter() - begun,
+        "cpu_seconds": time.process_time() - work,
+        "memory_mb": _most_memory(),
+        "worker": f"{platform.node()}:{os.getpid()}",
+    }
+
+
+def _most_memory() -> float | None:
+    """The most memory that this process ever held, in MB; known on Linux alone."""
+    try:
+        status = Path("/proc/self/status").read_text(encoding="ascii")
+    except OSError:
+        return None
+    peak = re.search(r"^VmHWM:\s*(\d+) kB", status, re.MULTILINE)
+    return None if peak is None else 1.024e-3 * int(peak[1])
+
+
+def _page_of(row: dict[str, Any]) -> str:
+    """The name of a log's page: what one can read, and what tells it from every other."""
+    told = "-".join(str(row[name]) for name in ("robot", "time") if row[name] is not None)
+    readable = re.sub(r"[^A-Za-z0-9._-]+", "_", f"{told}-{Path(row['path']).stem}")[-80:].lstrip(".-")
+    return f"{readable}-{hashlib.sha256(repr(_key(row)).encode()).hexdigest()[:8]}.html"
 
 
 def _tasks(pandas: Any, table: Any) -> list[dict[str, Any]]:
@@ -201,15 +242,15 @@ def _before(pandas: Any, target: Path, journal: Path) -> dict[tuple[Any, ...], d
 
 
 def _frame(pandas: Any, found: dict[tuple[Any, ...], dict[str, Any]]) -> Any:
-    texts = (*KEY, "status", "fault", "verdict", "summary", "effects", "parameters")
-    numbers = ("nrmse_before", "nrmse_after", "seconds")
+    texts = (*KEY, "status", "fault", "verdict", "summary", "effects", "parameters", "page", "worker")
+    numbers = ("nrmse_before", "nrmse_after", "seconds", "cpu_seconds", "memory_mb")
     rows = list(found.values())
     columns: dict[str, Any] = {
         name: pandas.Series([row.get(name) for row in rows], dtype="object") for name in texts
     }
     for name in numbers:
         columns[name] = pandas.Series([row.get(name) for row in rows], dtype="float64")
-    order = [*KEY, "status", "fault", "verdict", "effects", *numbers, "parameters", "summary"]
+    order = [*KEY, "status", "fault", "verdict", "effects", *numbers, "worker", "page", "parameters", "summary"]
     return pandas.DataFrame(columns)[order].sort_values(list(KEY), ignore_index=True)
 
 
