@@ -2,6 +2,17 @@
 
 use crate::{Array, Parameter, PlaceKind, Real, Role};
 
+/// What a recording must have for an effect to show in it. Where it has not, a diagnosis does not try the effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shows {
+    /// Nothing in particular: it shows wherever something moves.
+    Anywhere,
+    /// The signal measured at the channel is never below zero, although an input goes both ways.
+    NeverNegative,
+    /// The input at the channel rests at zero between other values.
+    InputAtZero,
+}
+
 /// What an effect says about itself.
 #[derive(Clone, Copy, Debug)]
 pub struct EffectMeta {
@@ -39,6 +50,8 @@ pub struct EffectMeta {
     pub before_input: bool,
     /// It is the law of the actuator's output: at its inputs it acts on what all other effects leave of the command.
     pub acts_last: bool,
+    /// What a recording must have for it to show.
+    pub shows: Shows,
     /// How rare it is: 0 nearly every machine has it, 1 common, 2 rare. Orders explanations that a
     /// recording cannot tell apart.
     pub rarity: u8,
@@ -71,6 +84,7 @@ impl EffectMeta {
         shared_only: false,
         before_input: false,
         acts_last: false,
+        shows: Shows::Anywhere,
         rarity: 1,
         simpler: &[],
         parameters: &[],

@@ -92,7 +92,7 @@ pub use clock::{Clock, SimulatedClock};
 pub use controller::{AffineModel, Command, ControlError, Controller, Quantity};
 pub use derived::Derived;
 pub use driver::{Driver, DriverError, DriverFault, Sample};
-pub use effect::{Effect, EffectArrays, EffectMeta, NoPast, Past, Physics, Reading};
+pub use effect::{Effect, EffectArrays, EffectMeta, NoPast, Past, Physics, Reading, Shows};
 pub use estimator::{Estimator, Innovation};
 pub use integrator::{Rk4, rk4_step, substeps};
 pub use limits::Limits;

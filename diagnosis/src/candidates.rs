@@ -3,11 +3,13 @@
 use loopsight_core::{Channel, EffectMeta, Parameter, Place, Role};
 use loopsight_model::model::{Attached, Model, misfit};
 use loopsight_model::registry;
+use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
 
 use crate::criteria::SearchCriteria;
 use crate::equivalent::{equivalent, preferred};
 use crate::positions::Positions;
+use crate::shows::can_show;
 
 /// An effect at a set of channels.
 #[derive(Clone, Debug)]
@@ -139,15 +141,16 @@ impl Candidate {
 /// All candidates for `model`: each effect at every single channel it fits, and at all channels of a
 /// family (both wheels, all inputs), alike and each with its own parameters.
 ///
-/// Left out are effects that the model already has at these channels and effects on signals that are not
-/// measured. Where the log's inputs were measured at the machine, effects before that point are left out too.
-/// An effect that contains one of the model's at the same channels replaces it.
+/// Left out are effects that the model already has at these channels, effects on signals that are not
+/// measured, and effects that cannot show in `runs`. Where the log's inputs were measured at the machine, effects
+/// before that point are left out too. An effect that contains one of the model's at the same channels replaces it.
 ///
 /// `rms` are the root mean squares of the plant's signals in the recording. Smoothing widths are set from
 /// them, because machines move at very different speeds. `observed` says that an observer corrects the free
 /// runs.
 pub(crate) fn candidates(
     model: &Model,
+    runs: &[Run],
     rms: &[f64],
     observed: bool,
     criteria: &SearchCriteria,
@@ -161,7 +164,8 @@ pub(crate) fn candidates(
                 .effects
                 .iter()
                 .any(|e| e.meta.id == meta.id && e.at.iter().any(|c| at.contains(&c.id)));
-            if present || has_another_name(model, meta, &at) {
+            let silent = !can_show(model, meta, &at, runs, criteria);
+            if present || silent || has_another_name(model, meta, &at) {
                 continue;
             }
             let contained = model.effects.iter().position(|e| {
@@ -244,9 +248,10 @@ fn refer(model: &mut Model, rms: &[f64]) {
     }
 }
 
-/// Whether a parameter is a value of the channel that the effect refers to, and no fit finds.
+/// Whether a parameter is a value of the channel that the effect refers to, and no fit finds. Something is divided by
+/// it, so it cannot be zero; a threshold can.
 fn is_reference(declaration: &Parameter) -> bool {
-    declaration.unit == "channel" && !declaration.estimated
+    declaration.unit == "channel" && !declaration.estimated && !declaration.admits(0.0)
 }
 
 /// Root mean square of the flow at an effect's channels; 0 where there is none.

@@ -122,6 +122,7 @@ fn steps(
 
     let plain = fit_plain(diagnosis, model, &holdout, work)?;
     let nominal = Nominal {
+        given: model,
         model: &plain.model,
         solution: &plain.solution,
         cost: plain.cost,
@@ -230,7 +231,9 @@ fn search(
         work,
     )?;
     let observed = diagnosis.observer.is_some();
-    let all = candidates(nominal.model, &rms, observed, &work.criteria().search);
+    let runs = nominal.holdout.runs;
+    let criteria = &work.criteria().search;
+    let all = candidates(nominal.model, runs, &rms, observed, criteria);
     let search = Search {
         all: &all,
         nominal,

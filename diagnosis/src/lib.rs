@@ -106,6 +106,7 @@ mod rounding;
 mod score;
 mod search;
 mod settings;
+mod shows;
 mod solve;
 mod starts;
 mod stride;

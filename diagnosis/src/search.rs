@@ -12,7 +12,7 @@ use crate::criteria::{Criteria, SearchCriteria};
 use crate::explain::explain;
 use crate::judge::nrmse;
 use crate::progress::{Stage, Work};
-use crate::starts::{first_starts, grown_starts};
+use crate::starts::{first_starts, fresh_starts, grown_starts};
 use crate::trial::{Judged, Nominal, finish, look, promise};
 
 /// A candidate by its index, and where to start it from.
@@ -90,7 +90,8 @@ impl Search<'_> {
             .filter(|(_, c)| !c.separate)
             .flat_map(|(i, c)| {
                 let starts = first_starts(c, self.nominal.model, duration);
-                starts.into_iter().map(move |start| (i, start))
+                let fresh = fresh_starts(c, self.nominal, duration);
+                starts.into_iter().chain(fresh).map(move |start| (i, start))
             })
             .collect();
         let promising = self.promising(attempts);

@@ -2,10 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use loopsight_core::Shows;
 use loopsight_model::model::Model;
 
 use crate::candidates::Candidate;
-use crate::trial::Judged;
+use crate::judge::nrmse;
+use crate::problem::declared;
+use crate::trial::{Judged, Nominal};
 
 /// Starting values of a speed that is estimated, as shares of the flow.
 const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
@@ -24,6 +27,40 @@ pub(crate) fn first_starts(candidate: &Candidate, nominal: &Model, duration: f64
         base.drain(gone.clone());
     }
     starts(candidate, &base, &known, duration)
+}
+
+/// Starting values of a candidate that has nothing to do with what the plain model was fitted to, where that fit got
+/// lost: a sensor that does not know the sign turns half of the motion round. They are those of the model as it was
+/// given, and others scattered around them.
+pub(crate) fn fresh_starts(
+    candidate: &Candidate,
+    nominal: &Nominal<'_>,
+    duration: f64,
+) -> Vec<Vec<f64>> {
+    let lost = nrmse(nominal.rank) > nominal.work.criteria().start.lost;
+    if candidate.meta.shows != Shows::NeverNegative || !lost {
+        return Vec::new();
+    }
+    let known = BTreeMap::new();
+    let given = declared(nominal.given);
+    let begun = starts(candidate, &given, &known, duration);
+    let scattered = begun.first().and_then(|first| {
+        let mut model = candidate.model.clone();
+        let parameters = model.parameters.iter_mut();
+        for (parameter, given) in parameters.zip(&nominal.given.parameters) {
+            parameter.value = given.value;
+        }
+        for i in candidate.own() {
+            model.parameters[i].free = false;
+            model.parameters[i].value = Some(first[i]);
+        }
+        let problem = nominal.problem(&model, Some(&nominal.solution.states))?;
+        problem.scattered_values(first).ok()
+    });
+    begun
+        .into_iter()
+        .chain(scattered.into_iter().flatten())
+        .collect()
 }
 
 /// Values to start a candidate from where `simpler` ended.

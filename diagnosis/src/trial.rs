@@ -80,6 +80,8 @@ fn coarse(candidate: &Candidate, steps: f64) -> Model {
 
 /// The model without any candidate, fitted, and what every candidate is fitted to and judged on.
 pub(crate) struct Nominal<'a> {
+    /// It before it was fitted.
+    pub(crate) given: &'a Model,
     pub(crate) model: &'a Model,
     pub(crate) solution: &'a Solution,
     /// Its cost.
@@ -98,7 +100,11 @@ impl<'a> Nominal<'a> {
 
     /// The problem of fitting `model` to the fitting data. Initial states that are not known are estimated. None
     /// where the work was cancelled.
-    fn problem<'m>(&self, model: &'m Model, known: Option<&[DVector<f64>]>) -> Option<Problem<'m>>
+    pub(crate) fn problem<'m>(
+        &self,
+        model: &'m Model,
+        known: Option<&[DVector<f64>]>,
+    ) -> Option<Problem<'m>>
     where
         'a: 'm,
     {

@@ -28,6 +28,8 @@ pub(crate) struct AmplifierParts {
     pub(crate) gain: f64,
     /// Offset, V.
     pub(crate) offset: f64,
+    /// At command zero all switches of the bridge are open.
+    pub(crate) coasts: bool,
 }
 
 impl Default for AmplifierParts {
@@ -41,8 +43,18 @@ impl Default for AmplifierParts {
             limit: f64::INFINITY,
             gain: 1.0,
             offset: 0.0,
+            coasts: false,
         }
     }
+}
+
+/// What an amplifier does over a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Demand {
+    /// Mean voltage demanded, V.
+    pub(crate) voltage: f64,
+    /// All switches are open: the winding is connected to nothing but the diodes of the bridge.
+    pub(crate) open: bool,
 }
 
 /// An amplifier at work.
@@ -73,8 +85,8 @@ impl Amplifier {
         }
     }
 
-    /// Mean voltage demanded over a step in which `command` is applied, V.
-    pub(crate) fn step(&mut self, command: f64) -> f64 {
+    /// What is demanded over a step in which `command` is applied.
+    pub(crate) fn step(&mut self, command: f64) -> Demand {
         let parts = &self.parts;
         let late = self.line.push(command);
         let difference = self.filtered - late;
@@ -88,7 +100,10 @@ impl Amplifier {
         } else {
             (parts.full * (live.abs() / parts.full).powf(parts.exponent)).copysign(live)
         };
-        parts.gain * curved.clamp(-parts.limit, parts.limit) + parts.offset
+        Demand {
+            voltage: parts.gain * curved.clamp(-parts.limit, parts.limit) + parts.offset,
+            open: parts.coasts && late == 0.0,
+        }
     }
 }
 
@@ -105,7 +120,7 @@ mod tests {
             },
             1e-3,
         );
-        let out: Vec<f64> = (0..5).map(|_| late.step(2.0)).collect();
+        let out: Vec<f64> = (0..5).map(|_| late.step(2.0).voltage).collect();
         assert_eq!(out, [0.0, 0.0, 0.0, 2.0, 2.0]);
         let mut dead = Amplifier::new(
             AmplifierParts {
@@ -118,7 +133,7 @@ mod tests {
             1e-3,
         );
         assert_eq!(
-            [0.5, -3.0, 9.0].map(|v| dead.step(v)),
+            [0.5, -3.0, 9.0].map(|v| dead.step(v).voltage),
             [0.5, -3.5, 12.5],
             "within the zone, below it, beyond the limit"
         );
@@ -131,9 +146,20 @@ mod tests {
             1e-3,
         );
         assert_eq!(
-            [0.0, 6.0, -6.0, 12.0].map(|v| curved.step(v)),
+            [0.0, 6.0, -6.0, 12.0].map(|v| curved.step(v).voltage),
             [0.0, 3.0, -3.0, 12.0],
             "a quarter of the voltage at half the command"
+        );
+        let mut loose = Amplifier::new(
+            AmplifierParts {
+                coasts: true,
+                ..AmplifierParts::default()
+            },
+            1e-3,
+        );
+        assert_eq!(
+            [0.0, 1.0, 0.0].map(|v| loose.step(v).open),
+            [true, false, true]
         );
         let mut slow = Amplifier::new(
             AmplifierParts {

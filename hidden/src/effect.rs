@@ -70,6 +70,7 @@ effects! {
     InputPower "input_power" Twil "speed controllers whose voltage goes with a power of the command",
     InputDelay "input_delay" Twil "commands that take effect late",
     ActuatorLag "actuator_lag" Twil "a filter before both amplifiers",
+    BridgeCoast "bridge_coast" Twil "motor drivers that let go of the motors at command zero",
     InputOffset "input_offset" Twil "a bias on the right amplifier",
     GainAsymmetry "gain_asymmetry" Twil "right amplifier stronger, left one weaker",
     BatterySag "battery_sag" Twil "a battery with internal resistance",
@@ -80,6 +81,7 @@ effects! {
     SensorOffset "sensor_offset" Twil "a bias on the measured yaw rate",
     SensorScale "sensor_scale" Twil "a wrong scale on the measured forward speed",
     WheelRadiusMismatch "wheel_radius_mismatch" Twil "measuring wheels, undriven, the right one larger and the left one smaller than odometry believes",
+    SensorMagnitude "sensor_magnitude" Axis "a tachometer that counts marks on the shaft, whichever way they pass",
     EncoderRipple "encoder_ripple" Twil "an encoder disc, the right one, that does not turn about its centre",
 }
 

@@ -66,6 +66,8 @@ pub(crate) struct Machine {
     grips: Grips,
     windings: [Winding; 2],
     amplifiers: [Amplifier; 2],
+    /// Bridges whose switches are open in this step.
+    open: [bool; 2],
     velocities: Velocities,
     /// Angles of the wheels where the encoders sit. With slip: of measuring wheels that roll.
     angles: [f64; 2],
@@ -94,6 +96,7 @@ impl Machine {
             grips: Grips::default(),
             windings: [winding; 2],
             amplifiers,
+            open: [false; 2],
             velocities: Velocities::default(),
             angles: [0.0; 2],
             wheel_angles: [0.0; 2],
@@ -170,7 +173,9 @@ impl Machine {
         self.load_payload();
         let mut demanded = [0.0; 2];
         for k in 0..self.drives {
-            demanded[k] = self.amplifiers[k].step(commands[k]);
+            let demand = self.amplifiers[k].step(commands[k]);
+            demanded[k] = demand.voltage;
+            self.open[k] = demand.open;
         }
         let currents = self.windings.map(|w| w.current);
         let voltages = self.physics.battery.supply(demanded, currents);
@@ -213,7 +218,11 @@ impl Machine {
             } else {
                 wheel
             };
-            let (driven, current) = self.windings[k].torque(voltages[k], rotor);
+            let (driven, current) = if self.open[k] {
+                self.windings[k].coasting(physics.battery.open_circuit, rotor)
+            } else {
+                self.windings[k].torque(voltages[k], rotor)
+            };
             currents[k] = current;
             let mut torque = match physics.gap {
                 None => driven,

@@ -78,6 +78,31 @@ impl Winding {
         (torque / motor.gear_ratio, end)
     }
 
+    /// As [`Winding::torque`] with all switches of its bridge open. The current runs on through the diodes against
+    /// the supply until it ends, and stays zero.
+    ///
+    /// The back-emf is below the supply, so that the diodes do not conduct again.
+    pub(crate) fn coasting(&self, supply: f64, speed: f64) -> (f64, f64) {
+        let motor = &self.motor;
+        let rotor = speed / motor.gear_ratio;
+        let against = -supply * self.current.signum();
+        let settled = (against - motor.back_emf_constant * rotor) / self.resistance;
+        // `i(t) = settled + (current - settled) exp(-t R/L)` is zero after this share of `L/R`.
+        let ends = ((self.current - settled) / -settled).ln();
+        let lasts = self.step * self.resistance / motor.inductance;
+        let (mean, end) = if self.current == 0.0 {
+            (0.0, 0.0)
+        } else if ends.is_finite() && ends < lasts {
+            let passed = settled * ends - (self.current - settled) * (-ends).exp_m1();
+            (passed / lasts, 0.0)
+        } else {
+            let end = settled + (self.current - settled) * self.decay;
+            (settled + (self.current - settled) * self.mean, end)
+        };
+        let torque = motor.torque_constant * mean - motor.rotor_friction * rotor;
+        (torque / motor.gear_ratio, end)
+    }
+
     /// Takes over the current at the end of a step.
     pub(crate) fn advance(&mut self, current: f64) {
         self.lost += self.resistance * current * current * self.step;
@@ -137,6 +162,39 @@ mod tests {
             let exact = 9.0 / motor.resistance * (1.0 - (-t / time_constant).exp());
             assert!((end - exact).abs() < 1e-12);
         }
+    }
+
+    /// With the supply against it the current of a stalled winding falls from `i` to zero in
+    /// `L/R ln(1 + i R/V)`; the charge until then follows from `L i = ∫ (V + R i) dt`.
+    #[test]
+    fn an_open_bridge_ends_the_current_and_brakes_nothing() {
+        let motor = Driven::Twil.parts().0;
+        let (supply, started) = (12.0, 0.4);
+        let mut winding = Winding::new(motor, None, 1e-6);
+        winding.current = started;
+        let lasts =
+            motor.inductance / motor.resistance * (1.0 + started * motor.resistance / supply).ln();
+        let mut charge = 0.0;
+        let mut steps = 0;
+        while winding.current > 0.0 {
+            let (torque, end) = winding.coasting(supply, 0.0);
+            charge += torque * motor.gear_ratio / motor.torque_constant * 1e-6;
+            winding.advance(end);
+            steps += 1;
+        }
+        assert!(
+            (f64::from(steps) * 1e-6 - lasts).abs() < 1.1e-6,
+            "{steps} {lasts}"
+        );
+        let expected = (motor.inductance * started - supply * lasts) / motor.resistance;
+        assert!(
+            (charge / expected - 1.0).abs() < 1e-6,
+            "{charge} {expected}"
+        );
+        let (torque, end) = winding.coasting(supply, 3.0);
+        let friction = -motor.rotor_friction * 3.0 / motor.gear_ratio.powi(2);
+        assert_eq!(end, 0.0);
+        assert!((torque / friction - 1.0).abs() < 1e-12);
     }
 
     #[test]

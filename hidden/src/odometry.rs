@@ -26,7 +26,8 @@ pub(crate) struct Eccentricity {
 /// y_j(t_k) = scale_j Σ_i gain_ji Δ (N_i(t_k - d) - N_i(t_k-1 - d))/T + offset_j
 /// ```
 ///
-/// With a lag the counts pass a first-order filter, whose output is in whole counts, too.
+/// With a lag the counts pass a first-order filter, whose output is in whole counts, too. With one track `N` is the
+/// number of marks that have passed, whichever way, and the angle is the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct OdometryParts {
     /// Number of signals.
@@ -43,6 +44,8 @@ pub(crate) struct OdometryParts {
     pub(crate) scale: [f64; 2],
     /// Radius of each measuring wheel over the nominal one.
     pub(crate) wheel_size: [f64; 2],
+    /// The discs have one track of marks, which does not show the direction.
+    pub(crate) one_track: bool,
     /// Of each disc.
     pub(crate) eccentricity: [Eccentricity; 2],
 }
@@ -66,6 +69,7 @@ impl OdometryParts {
             offset: [0.0; 2],
             scale: [1.0; 2],
             wheel_size: [1.0; 2],
+            one_track: false,
             eccentricity: [Eccentricity::default(); 2],
         }
     }
@@ -90,6 +94,8 @@ pub(crate) struct Odometry {
     decay: f64,
     now: Reading,
     last: Reading,
+    /// What the discs were at after the last step.
+    seen: Reading,
     /// Every step counts, not only those at which a sample is taken.
     every_step: bool,
 }
@@ -109,10 +115,12 @@ impl Odometry {
             decay,
             now: Reading::default(),
             last: Reading::default(),
-            every_step: parts.delay > 0.0 || parts.lag > 0.0,
+            seen: Reading::default(),
+            every_step: parts.delay > 0.0 || parts.lag > 0.0 || parts.one_track,
         };
         odometry.now = odometry.read([0.0; 2]);
         odometry.last = odometry.now;
+        odometry.seen = odometry.now;
         odometry
     }
 
@@ -140,7 +148,15 @@ impl Odometry {
             return;
         }
         let late = self.line.push(angles);
-        let read = self.read(late);
+        let mut read = self.read(late);
+        if self.parts.one_track {
+            let way = |now: f64, before: f64, passed: f64| passed + (now - before).abs();
+            let seen = std::mem::replace(&mut self.seen, read);
+            for i in 0..2 {
+                read.exact[i] = way(read.exact[i], seen.exact[i], self.now.exact[i]);
+                read.counted[i] = way(read.counted[i], seen.counted[i], self.now.counted[i]);
+            }
+        }
         for i in 0..2 {
             let pass = |old: &mut f64, new: f64| *old = new + (*old - new) * self.decay;
             pass(&mut self.now.exact[i], read.exact[i]);
@@ -193,6 +209,22 @@ mod tests {
             sum[1] += counted[1] - exact[1];
         }
         assert!(sum.iter().all(|s| (s / 1000.0).abs() < 1e-3), "{sum:?}");
+    }
+
+    /// There and back: no angle, but twice the way.
+    #[test]
+    fn one_track_counts_both_ways() {
+        let mut one = parts();
+        one.one_track = true;
+        let mut odometry = Odometry::new(one, [0.2; 2], 1e-4);
+        for k in 1..=1000 {
+            let angle = (TAU * f64::from(k) / 2000.0).sin();
+            odometry.step([angle, -angle], k == 1000);
+        }
+        let ([counted, _], [exact, _]) = odometry.sample(0.1);
+        let expected = 0.025 * (2.0 + 2.0) / 0.1;
+        assert!((exact - expected).abs() < 1e-4, "{exact}");
+        assert!((counted - expected).abs() < 0.025 * 4.0 * RESOLUTION / 0.1);
     }
 
     #[test]

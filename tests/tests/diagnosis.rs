@@ -110,6 +110,18 @@ fn a_power_law_is_found_with_its_exponent() {
     finds_under(Experiment::Mixed, Hidden::InputPower, 1.0, 7);
 }
 
+/// The plain model leaves as much as a constant would, so the search begins afresh.
+#[test]
+fn a_sensor_without_direction_is_found() {
+    finds(Hidden::SensorMagnitude, 1.0, 1);
+}
+
+/// Found by what happens at command zero, with the electrical share of the damping.
+#[test]
+fn a_coasting_bridge_is_found_with_its_share() {
+    finds_under(Experiment::Mixed, Hidden::BridgeCoast, 0.5, 7);
+}
+
 /// A dead zone of the driver cannot lie behind the terminals of a motor: where the voltages were measured
 /// there, neither it nor anything else that acts before them is looked for.
 #[test]

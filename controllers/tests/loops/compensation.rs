@@ -249,13 +249,13 @@ fn every_effect_of_the_library_can_stand_in_a_loop() {
         | "sensor_delay"
         | "sensor_lag"
         | "sensor_window"
+        | "sensor_magnitude"
         | "sensor_offset"
         | "sensor_scale"
         | "wheel_radius_mismatch" => Some("predicted over"),
-        "backlash" | "wheel_slip" | "payload_change" | "torque_ripple" | "gravity_slope"
-        | "gravity_pendulum" | "linear_stiffness" | "cubic_stiffness" | "encoder_ripple" => {
-            Some("not compensated")
-        }
+        "backlash" | "bridge_coast" | "wheel_slip" | "payload_change" | "torque_ripple"
+        | "gravity_slope" | "gravity_pendulum" | "linear_stiffness" | "cubic_stiffness"
+        | "encoder_ripple" => Some("not compensated"),
         "coulomb_friction"
         | "stribeck_friction"
         | "directional_friction"

@@ -133,6 +133,10 @@ criteria! {
         sharpest: f64 = 0.004 "flow", Judgement: "sharp enough for stiction to hold a shaft at rest";
         /// The next width, where that is too sharp for the integrator.
         sharp: f64 = 0.01 "flow", Judgement: "half the first width";
+        /// Root mean square of what a signal has below zero, over its own, up to which its sensor may give the magnitude only.
+        negative: f64 = 0.05 "1", Judgement: "noise about zero";
+        /// Time at zero of an input that was not zero before, from which an effect at command zero is tried.
+        rests_s: f64 = 0.2 "s", Judgement: "in less a machine hardly slows down";
         /// Steepest row of a Jacobian over the median one, beyond which a sign is too sharp for the integrator.
         wild: f64 = 1e4 "1", Judgement: "the derivatives are then useless";
         /// A speed of an effect below this many widths of a smoothed sign cannot be told from the smoothing.

@@ -58,6 +58,24 @@ pub(super) fn lag(m: &mut Physics, mut of: Concealed) -> Concealed {
     of.fitted("lag", lag, "s")
 }
 
+/// All switches of a bridge open at command zero. Below a size of 1 the motor has weaker magnets, fewer turns and
+/// more friction in its bearings: driven it is the same machine, but less of its damping is electrical.
+pub(super) fn coast(m: &mut Physics, mut of: Concealed) -> Concealed {
+    each(m, &mut of, |a| a.coasts = true);
+    let motor = &mut m.motor;
+    let braking = motor.torque_constant * motor.back_emf_constant / motor.resistance;
+    let damping = braking + motor.rotor_friction;
+    motor.torque_constant *= of.size;
+    motor.back_emf_constant *= of.size;
+    motor.resistance *= of.size;
+    motor.inductance *= of.size;
+    motor.rotor_friction = damping - of.size * braking;
+    let friction = motor.rotor_friction;
+    let share = of.size * braking / damping;
+    of.fitted("share", share, "1")
+        .physical("rotor_friction", friction, "N m s/rad")
+}
+
 /// 0.6 V too much on one motor.
 pub(super) fn offset(m: &mut Physics, mut of: Concealed) -> Concealed {
     at_inputs(m, &mut of);

@@ -54,6 +54,7 @@ pub(crate) fn hide(
         H::InputPower => input::power(machine, concealed),
         H::InputDelay => input::delay(machine, concealed),
         H::ActuatorLag => input::lag(machine, concealed),
+        H::BridgeCoast => input::coast(machine, concealed),
         H::InputOffset => input::offset(machine, concealed),
         H::GainAsymmetry => input::asymmetry(machine, concealed),
         H::BatterySag => input::sag(machine, concealed),
@@ -63,6 +64,7 @@ pub(crate) fn hide(
         H::SensorOffset => output::offset(machine, concealed),
         H::SensorScale => output::scale(machine, concealed),
         H::WheelRadiusMismatch => output::radius(machine, concealed),
+        H::SensorMagnitude => output::magnitude(machine, concealed),
         H::EncoderRipple => output::ripple(machine, concealed),
     })
 }
@@ -87,15 +89,19 @@ fn largest(effect: Hidden) -> f64 {
         H::CentrifugalOffset => 2.1,
         // The limit would be 0.
         H::InputSaturation => 4.0,
+        // The bearings would have less than no friction.
+        H::BridgeCoast => 1.0,
         _ => 10.0,
     }
 }
 
 fn fits(effect: Hidden, robot: Driven) -> bool {
     match effect {
-        H::ConstantForce | H::GravityPendulum | H::LinearStiffness | H::CubicStiffness => {
-            robot == Driven::Axis
-        }
+        H::ConstantForce
+        | H::GravityPendulum
+        | H::LinearStiffness
+        | H::CubicStiffness
+        | H::SensorMagnitude => robot == Driven::Axis,
         H::ScrubFriction
         | H::GravitySlope
         | H::CentrifugalOffset

@@ -49,6 +49,13 @@ pub(super) fn scale(m: &mut Physics, mut of: Concealed) -> Concealed {
     of.fitted("error", share, "1")
 }
 
+/// A single track of marks: it counts them, and does not know which way they pass. It has no size.
+pub(super) fn magnitude(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_sensors(m, &mut of);
+    m.odometry.one_track = true;
+    of.fitted("turned", 1.0, "1")
+}
+
 /// Undriven measuring wheels, the right one 5 % larger, the left one 5 % smaller than odometry
 /// believes. Of driven wheels of different size encoders would show next to nothing: a larger wheel
 /// turns as fast at the same voltage.

@@ -232,7 +232,8 @@ impl<'m> Trial<'m> {
         })
     }
 
-    /// More of the command, either way from none, is at first nothing and then more at the plant.
+    /// More of the command, either way from none, is at first nothing and then more at the plant, and never less
+    /// while it is small.
     fn grows(&self, bound: &Bound, x: &[f64], u: &[f64]) -> bool {
         let Place::Input(i) = bound.place else {
             return false;
@@ -245,7 +246,7 @@ impl<'m> Trial<'m> {
         [-1.0, 1.0].iter().all(|sign| {
             let change = |k| sign * (at(sign * 0.01 * 2f64.powi(k)) - at(0.0));
             let first = (0..20).map(change).find(|c| c.abs() > 1e-9);
-            first.is_some_and(|c| c > 0.0)
+            first.is_some_and(|c| c > 0.0) && (0..8).map(change).all(|c| c > -1e-9)
         })
     }
 

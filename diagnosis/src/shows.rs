@@ -1,0 +1,150 @@
+//! Whether an effect can show in a recording.
+
+use loopsight_core::{Channel, EffectMeta, Place, Shows};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+
+use crate::criteria::SearchCriteria;
+
+/// Share of the largest command below which a command counts as zero.
+const ZERO: f64 = 1e-3;
+
+/// Whether an effect at the channels `at` can show in `runs`. A candidate that cannot is not tried, so that the cost of
+/// a diagnosis does not grow with every effect of the library.
+pub(crate) fn can_show(
+    model: &Model,
+    meta: &EffectMeta,
+    at: &[&str],
+    runs: &[Run],
+    criteria: &SearchCriteria,
+) -> bool {
+    let mut channels = (model.plant.channels.iter()).filter(|c| at.contains(&c.id));
+    match meta.shows {
+        Shows::Anywhere => true,
+        Shows::NeverNegative => {
+            (0..model.plant.inputs.len()).any(|input| goes_both_ways(input, runs))
+                && channels.all(|c| never_negative(model, c, runs, criteria.negative))
+        }
+        Shows::InputAtZero => channels.any(|c| rests(c, runs, criteria.rests_s)),
+    }
+}
+
+/// Whether an input has values of both signs.
+fn goes_both_ways(input: usize, runs: &[Run]) -> bool {
+    let values = || {
+        runs.iter()
+            .flat_map(move |run| (0..run.len()).map(move |k| run.input(k)[input]))
+    };
+    values().any(|u| u > 0.0) && values().any(|u| u < 0.0)
+}
+
+/// Whether the signal measured at a channel has hardly anything below zero.
+fn never_negative(model: &Model, channel: &Channel, runs: &[Run], most: f64) -> bool {
+    let Place::Output(index) = channel.place else {
+        return false;
+    };
+    let Some(signal) = model.measured.iter().position(|m| m.index == index) else {
+        return false;
+    };
+    let values = runs
+        .iter()
+        .flat_map(|run| (0..run.len()).map(|k| run.sample(k)[signal]));
+    let (mut all, mut below) = (0.0, 0.0);
+    for y in values.filter(|y| y.is_finite()) {
+        all += y * y;
+        below += y.min(0.0).powi(2);
+    }
+    all > 0.0 && below <= most * most * all
+}
+
+/// Whether the input at a channel is zero for as long as `least` s, once it was not.
+fn rests(channel: &Channel, runs: &[Run], least: f64) -> bool {
+    let Place::Input(input) = channel.place else {
+        return false;
+    };
+    let sizes = |run: &'_ Run| {
+        (0..run.len())
+            .map(|k| run.input(k)[input].abs())
+            .collect::<Vec<_>>()
+    };
+    let largest = runs.iter().flat_map(sizes).fold(0.0, f64::max);
+    let resting = |run: &Run| {
+        let sizes = sizes(run);
+        let driven = sizes.iter().position(|u| *u > ZERO * largest);
+        let after = driven.unwrap_or(run.len())..run.len().saturating_sub(1);
+        after
+            .filter(|k| sizes[*k] <= ZERO * largest)
+            .map(|k| run.time()[k + 1] - run.time()[k])
+            .sum::<f64>()
+    };
+    largest > 0.0 && runs.iter().map(resting).sum::<f64>() >= least
+}
+
+#[cfg(test)]
+mod tests {
+    use loopsight_plants as _;
+
+    use super::*;
+
+    const AXIS: &str = "[plant.dc_axis]\nK_A = -3.0\nK_C = 8.0\n\
+                        [log.measured]\nspeed = { sensor = \"instantaneous\" }\n";
+
+    /// Whether an effect can show in 4 s of 100 Hz with this input and this measured speed.
+    fn shows(what: Shows, at: &str, input: fn(f64) -> f64, speed: fn(f64) -> f64) -> bool {
+        let (axis, _) = Model::from_toml("axis.toml", AXIS).unwrap();
+        let mut run = Run::empty(1, 1);
+        for k in 0..400 {
+            let t = 0.01 * f64::from(k);
+            run.push(t, &[input(t)], &[speed(t)]).unwrap();
+        }
+        let meta = EffectMeta {
+            shows: what,
+            ..EffectMeta::PLAIN
+        };
+        can_show(&axis, &meta, &[at], &[run], &SearchCriteria::DEFAULT)
+    }
+
+    #[test]
+    fn a_magnitude_is_never_negative_though_the_input_is() {
+        let magnitude = |input, speed| shows(Shows::NeverNegative, "sensor.speed", input, speed);
+        let wave: fn(f64) -> f64 = |t| 5.0 * (3.0 * t).sin();
+        let folded: fn(f64) -> f64 = |t| (5.0 * (3.0 * t).sin()).abs();
+        assert!(magnitude(wave, folded));
+        assert!(
+            magnitude(wave, |t| (5.0 * (3.0 * t).sin()).abs() - 0.1),
+            "noise"
+        );
+        assert!(
+            magnitude(wave, |t| if t < 1.0 { f64::NAN } else { t }),
+            "missing samples"
+        );
+        assert!(!magnitude(wave, wave), "it goes below zero");
+        assert!(!magnitude(folded, folded), "nothing goes backwards");
+        assert!(
+            !shows(Shows::NeverNegative, "sensor.angle", wave, folded),
+            "not measured"
+        );
+    }
+
+    #[test]
+    fn a_bridge_coasts_where_the_command_returns_to_zero() {
+        let coasts = |input| shows(Shows::InputAtZero, "input", input, |t| t);
+        assert!(coasts(|t| if (1.0..2.0).contains(&t) { -5.0 } else { 0.0 }));
+        assert!(
+            coasts(|t| if t < 3.7 { 5.0 } else { 1e-4 }),
+            "hardly more than zero"
+        );
+        assert!(
+            !coasts(|t| if t < 3.0 { 0.0 } else { 5.0 }),
+            "at rest before it"
+        );
+        assert!(!coasts(|t| if t < 3.9 { 5.0 } else { 0.0 }), "too short");
+        assert!(!coasts(|t| 5.0 * (3.0 * t + 0.1).sin()), "in passing");
+        assert!(!coasts(|_| 0.0));
+    }
+
+    #[test]
+    fn other_effects_show_anywhere() {
+        assert!(shows(Shows::Anywhere, "shaft", |_| 1.0, |_| 0.0));
+    }
+}
