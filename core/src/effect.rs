@@ -114,8 +114,8 @@ pub struct Reading<'a, S> {
     pub is_position: bool,
     /// The signals by role, where the channel binds one and the effect declares it.
     pub roles: [Option<&'a S>; Role::COUNT],
-    /// All signals of the plant: states, inputs, outputs. Outputs that nobody asked for may be of
-    /// an earlier instant.
+    /// All signals of the plant: states, inputs, outputs. Those that nobody asked for may be of an
+    /// earlier instant.
     pub signals: &'a [S],
     /// The channel's nominal value in the past.
     pub past: &'a dyn Past<S>,

@@ -99,8 +99,9 @@ impl Bounds {
 
     /// Signals that effects acting within a step read.
     pub(crate) fn read(&self) -> impl Iterator<Item = usize> + '_ {
-        self.inputs
+        self.input_memory
             .iter()
+            .chain(&self.inputs)
             .chain(&self.efforts)
             .chain(&self.bodies)
             .chain(&self.outputs)

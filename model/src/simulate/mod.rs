@@ -15,6 +15,7 @@ mod stiff;
 mod values;
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 
 use crate::log_map::Hold;
 use crate::model::Model;
@@ -56,8 +57,7 @@ pub struct Simulator<'m, S> {
     before: Vec<S>,
     /// What output effects added to angles then, one per output effect.
     added_before: Vec<S>,
-    /// Outputs that are needed at every stage, by index among the outputs.
-    needed: Vec<usize>,
+    needed: Needed,
     time: f64,
     interval: f64,
     /// Longest integration step, s.
@@ -69,6 +69,27 @@ pub struct Simulator<'m, S> {
     slopes: Vec<f64>,
     /// Inputs that run on straight lines between samples.
     ramped: Vec<usize>,
+}
+
+/// The signals that are looked at within a step, each by its index among its kind. Only these are kept up to
+/// date there: with the rest of them a tenth of a diagnosis went into copies.
+#[derive(Clone)]
+struct Needed {
+    states: Vec<usize>,
+    inputs: Vec<usize>,
+    outputs: Vec<usize>,
+}
+
+impl Needed {
+    /// Of signals by index among states, inputs and outputs; there are `nx` states and `nu` inputs.
+    fn of(signals: impl Iterator<Item = usize>, nx: usize, nu: usize) -> Self {
+        let all: BTreeSet<usize> = signals.collect();
+        Self {
+            states: all.range(..nx).copied().collect(),
+            inputs: all.range(nx..nx + nu).map(|i| i - nx).collect(),
+            outputs: all.range(nx + nu..).map(|i| i - nx - nu).collect(),
+        }
+    }
 }
 
 #[derive(Clone)]
@@ -120,13 +141,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             .iter()
             .filter(|s| matches!(s.integral, Integral::State(_)))
             .map(|s| s.index);
-        let mut needed: Vec<usize> = bounds
-            .read()
-            .chain(integrated)
-            .filter_map(|i| i.checked_sub(nx + nu))
-            .collect();
-        needed.sort_unstable();
-        needed.dedup();
+        let needed = Needed::of(bounds.read().chain(integrated), nx, nu);
         // Not cloned from one: a clone of an empty history has no room kept for what is to come.
         let histories = (0..bounds.histories)
             .map(|i| {

@@ -67,18 +67,28 @@ impl<S: HostReal> Simulator<'_, S> {
             w,
             signals,
         } = scratch;
+        let changing = ramping || !bounds.inputs.is_empty();
         let rates = |stage: usize, x: &[S], dx: &mut [S]| {
             let time = from + h * [0.0, 0.5, 0.5, 1.0][stage];
             let plant_x = &x[..nx];
-            u.copy_from_slice(held);
+            let u: &mut [S] = if changing {
+                u.copy_from_slice(held);
+                u
+            } else {
+                held
+            };
             if ramping {
                 ramped(u, bounds, slopes, time - from);
             }
-            signals[..nx].copy_from_slice(plant_x);
+            for i in &needed.states {
+                signals[*i] = plant_x[*i];
+            }
             let refresh = |u: &[S], signals: &mut [S]| {
-                signals[nx..nx + nu].copy_from_slice(u);
-                for index in needed.iter() {
-                    signals[nx + nu + index] = dynamics.output(*index, plant_x, u, p);
+                for i in &needed.inputs {
+                    signals[nx + i] = u[*i];
+                }
+                for i in &needed.outputs {
+                    signals[nx + nu + i] = dynamics.output(*i, plant_x, u, p);
                 }
             };
             refresh(u, signals);
