@@ -225,6 +225,7 @@ def test_each_log_has_its_page_and_says_what_it_cost(tmp_path: Path) -> None:
 
 def test_mistakes_of_a_report_are_named() -> None:
     for wrong, part in [
+        (lambda: ls.fleet.trends("no.parquet"), "there is no table of results at no.parquet"),
         (lambda: ls.fleet.trends(pandas.DataFrame({"robot": []})), "no column `path`"),
         (lambda: ls.fleet.siblings(table(1), rate=5.0), "rate is 5.0, expected a share"),
         (lambda: ls.fleet.missing(table(1), by_chance=0.0), "by_chance is 0.0"),

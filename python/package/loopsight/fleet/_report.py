@@ -162,11 +162,12 @@ class _Said:
             kept = logs[~logs["wild"]]
             rows.append([
                 _robot(row["robot"]), _code(row["parameter"]), _picture(row, logs, kept),
-                _with_unit(row["change"], row["unit"]) + f"<br><span class=\"soft\">{_share(row['change'], row['value'])}</span>",
+                _with_unit(row["change"], row["unit"])
+                + f'<br><span class="soft">{_share(row["change"], row["value"])} in {row["days"]:.0f} days</span>',
                 _interval(row["change_low"], row["change_high"]),
-                _with_unit(7.0 * row["slope"], row["unit"]), f"{row['days']:.0f}", _q(row["q"]),
+                _with_unit(7.0 * row["slope"], row["unit"]), _q(row["q"]),
             ])  # fmt: skip
-        heads = ["robot", "parameter", "its logs", "#change", "#95 % interval", "#each week", "#days", "#q"]
+        heads = ["robot", "parameter", "its logs", "#change", "#95 % interval", "#each week", "#q"]
         return _section("Parameters that move", what, _table(heads, rows, len(self.moves)))
 
     def apart(self) -> str:
@@ -181,19 +182,25 @@ class _Said:
             if one["apart"].any() and len(figures) < PICTURES:
                 told = f"{parameter} of every robot" if of == "level" else f"slope of {parameter}"
                 chart = _charts.side_by_side(one, told)
-                ends = _interval(float(one["value"].min()), float(one["value"].max()))
-                unit = escape(one["unit"].iloc[0]) + ("/day" if of == "slope" else "")
-                count = int(one["apart"].sum())
-                caption = f"{_code(parameter)}{', slope' if of == 'slope' else ''}: {ends} {unit}; {count} of {len(one)} marked"
+                each = 7.0 if of == "slope" else 1.0
+                ends = _interval(each * float(one["value"].min()), each * float(one["value"].max()))
+                name = _code(parameter) + (" each week" if of == "slope" else "")
+                unit = _shown(one["unit"].iloc[0])
+                caption = f"{name}: {ends} {unit}; {int(one['apart'].sum())} of {len(one)} marked"
                 figures.append(f"<figure>{chart}<figcaption>{caption}</figcaption></figure>")
         if not figures:
             return _section("Unlike its siblings", f"No robot is. {what}", "")
-        rows = [
-            [_robot(row["robot"]), _code(row["parameter"]) + (" slope" if row["of"] == "slope" else ""),
-             _with_unit(row["value"], _unit(row)), _with_unit(row["fleet"], _unit(row)),
-             _with_unit(row["deviation"], _unit(row)), _interval(row["low"], row["high"]), _number(row["spread"]), _q(row["q"])]
-            for row in self.unlike.head(ROWS).to_dict("records")
-        ]  # fmt: skip
+        rows = []
+        for row in self.unlike.head(ROWS).to_dict("records"):
+            slope = row["of"] == "slope"
+            value, fleet, off, low, high, spread = (
+                row[name] * (7.0 if slope else 1.0) for name in ("value", "fleet", "deviation", "low", "high", "spread")
+            )
+            rows.append([
+                _robot(row["robot"]), _code(row["parameter"]) + (" each week" if slope else ""),
+                _with_unit(value, row["unit"]), _number(fleet), _number(off), _interval(low, high), _number(spread),
+                _q(row["q"]),
+            ])  # fmt: skip
         heads = ["robot", "parameter", "#value", "#fleet", "#deviation", "#95 % interval", "#spread", "#q"]
         body = f'<div class="grid forces">{"".join(figures)}</div>{_table(heads, rows, len(self.unlike))}'
         return _section("Unlike its siblings", what, body)
@@ -307,15 +314,16 @@ def _text(value: Any) -> str:
 
 
 def _number(value: float) -> str:
-    return f"{value:.3g}".replace("-", "−")
+    digits, _, power = f"{value:.3g}".replace("-", "−").partition("e")
+    return digits + (f"·10<sup>{power[0].strip('+')}{power[1:].lstrip('0')}</sup>" if power else "")
 
 
 def _with_unit(value: float, unit: str) -> str:
-    return f"{_number(value)} {escape('' if unit == '1' else unit)}".rstrip()
+    return f"{_number(value)} {_shown('' if unit == '1' else unit)}".rstrip()
 
 
-def _unit(row: dict[str, Any]) -> str:
-    return str(row["unit"]) + ("/day" if row["of"] == "slope" else "")
+def _shown(unit: str) -> str:
+    return escape(unit.replace("^2", "²").replace("^3", "³"))
 
 
 def _interval(low: float, high: float) -> str:

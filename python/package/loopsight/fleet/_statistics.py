@@ -8,7 +8,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
-from os import PathLike
+from os import PathLike, fspath
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from .._error import Error
@@ -39,6 +40,8 @@ def read(results: Any) -> Any:
     """The table of results, from a path or as it is."""
     pandas = pandas_and_scipy()
     if isinstance(results, (str, PathLike)):
+        if not Path(fspath(results)).is_file():
+            raise Error(f"there is no table of results at {fspath(results)}", file=fspath(results))
         results = pandas.read_parquet(results)
     for column in ("robot", "path", "status", "effects", "parameters"):
         if column not in results.columns:
