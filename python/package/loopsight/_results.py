@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -99,7 +99,12 @@ class Result:
 
     def _repr_html_(self) -> str:
         paragraphs = "".join(f"<p>{html.escape(line)}</p>" for line in str(self).splitlines())
-        return f'<div class="loopsight">{paragraphs}{_table(self._data.get("parameters"))}</div>'
+        tables = f"{self._details()}{_parameters(self._data.get('parameters'))}"
+        return f'<div class="loopsight">{paragraphs}{tables}</div>'
+
+    def _details(self) -> str:
+        """What a notebook shows between the summary and the parameters, in HTML."""
+        return ""
 
 
 class SeriesResult(Result):
@@ -153,6 +158,11 @@ class SeriesResult(Result):
 class Comparison(SeriesResult):
     """How well a model agrees with a log: ``nrmse``, ``fit_percent``, ``signals``, ``where_it_fails``."""
 
+    def _details(self) -> str:
+        found = self._data["where_it_fails"]
+        rows = [(one["statement"], f"{100 * one['share_of_squared_error']:.0f} %") for one in found]
+        return _table(("where it fails", "share of the squared error"), rows)
+
 
 class Fit(SeriesResult):
     """Parameters with intervals of 95 %: ``parameters``, ``derived``, ``nrmse``; `model` has them."""
@@ -178,6 +188,14 @@ class Diagnosis(SeriesResult):
         )
 
 
+    def _details(self) -> str:
+        rows = [
+            (one["effect"], " + ".join(one["at"]), _percent(one["nrmse"]), _number(one["significance"], 3))
+            for one in self._data["candidates"]
+        ]
+        return _table(("explanation", "at", "error with it", "significance"), rows)
+
+
 class Improvement(SeriesResult):
     """What was added to a model, step by step: ``steps``, ``parameters``; `model` has all of it."""
 
@@ -193,6 +211,19 @@ class Improvement(SeriesResult):
                 "nrmse_test": [row["nrmse_test"] for row in rows],
             }
         )
+
+
+    def _details(self) -> str:
+        rows = [
+            (
+                "the model as it is" if added is None else f"+ {added['effect']} at {' + '.join(added['at'])}",
+                _percent(row["nrmse_fit"]),
+                _percent(row["nrmse_test"]),
+            )
+            for row in self._data["steps"]
+            for added in [row["added"]]
+        ]
+        return _table(("step", "error in the fit", "error on unseen data"), rows)
 
 
 class Run(Result):
@@ -216,20 +247,34 @@ def frame_of(parameters: dict[str, Any]) -> Any:
     )
 
 
-def _table(parameters: Any) -> str:
+def _number(value: float | None, digits: int = 5) -> str:
+    return "" if value is None else f"{value:.{digits}g}"
+
+
+def _percent(share: float | None) -> str:
+    return "" if share is None else f"{100 * share:.{2 if share < 0.01 else 1}f} %"
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """A table in HTML, nothing without rows."""
+
+    def line(tag: str, cells: tuple[str, ...]) -> str:
+        first, *others = (html.escape(cell) for cell in cells)
+        # Notebooks align everything to the right; a sentence is not read so.
+        left = f'<{tag} style="text-align: left">{first}</{tag}>'
+        return f"<tr>{left}{''.join(f'<{tag}>{cell}</{tag}>' for cell in others)}</tr>"
+
+    body = "".join(line("td", row) for row in rows)
+    return f"<table><thead>{line('th', head)}</thead><tbody>{body}</tbody></table>" if body else ""
+
+
+def _parameters(parameters: Any) -> str:
     """Parameters as a table in HTML."""
     if not parameters or not all(isinstance(row, dict) for row in parameters.values()):
         return ""
-
-    def number(value: float | None) -> str:
-        return "" if value is None else f"{value:.5g}"
-
-    def rows() -> Iterator[str]:
-        for name, row in parameters.items():
-            low, high = row.get("interval95") or (None, None)
-            between = "" if low is None else f"{number(low)} … {number(high)}"
-            cells = (name, number(row["value"]), row["unit"], between, row["verdict"].replace("_", " "))
-            yield "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>"
-
-    head = "".join(f"<th>{cell}</th>" for cell in ("parameter", "value", "unit", "95 % interval", "verdict"))
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows())}</tbody></table>"
+    rows = []
+    for name, row in parameters.items():
+        low, high = row.get("interval95") or (None, None)
+        between = "" if low is None else f"{_number(low)} … {_number(high)}"
+        rows.append((name, _number(row["value"]), row["unit"], between, row["verdict"].replace("_", " ")))
+    return _table(("parameter", "value", "unit", "95 % interval", "verdict"), rows)
