@@ -235,12 +235,6 @@ impl Problem<'_> {
         }))
     }
 
-    /// The values of [`Problem::scattered`].
-    pub(crate) fn scattered_values(&self, values: &[f64]) -> Result<Vec<Vec<f64>>, FitError> {
-        let starts = self.scattered(values)?;
-        Ok(starts.into_iter().map(|start| start.values).collect())
-    }
-
     /// Starts scattered over the ranges of the parameters, or some decades around `values`, the best first.
     /// They are always the same ones.
     fn scattered(&self, values: &[f64]) -> Result<Vec<Start>, FitError> {

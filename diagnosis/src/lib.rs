@@ -114,6 +114,7 @@ mod sufficiency;
 mod timing;
 pub mod tracking;
 mod trial;
+mod unfold;
 mod unshown;
 mod where_it_fails;
 mod window;

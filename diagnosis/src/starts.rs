@@ -2,13 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_core::Shows;
+use loopsight_core::{Channel, Place, Shows};
 use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 
 use crate::candidates::Candidate;
 use crate::judge::nrmse;
-use crate::problem::declared;
-use crate::trial::{Judged, Nominal};
+use crate::problem::{Problem, declared};
+use crate::settings::FitSettings;
+use crate::trial::{FINAL, Judged, Nominal};
+use crate::unfold::unfolded;
 
 /// Starting values of a speed that is estimated, as shares of the flow.
 const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
@@ -31,7 +34,7 @@ pub(crate) fn first_starts(candidate: &Candidate, nominal: &Model, duration: f64
 
 /// Starting values of a candidate that has nothing to do with what the plain model was fitted to, where that fit got
 /// lost: a sensor that does not know the sign turns half of the motion round. They are those of the model as it was
-/// given, and others scattered around them.
+/// given, and those of its fit to the log with the sign that each input suggests.
 pub(crate) fn fresh_starts(
     candidate: &Candidate,
     nominal: &Nominal<'_>,
@@ -41,26 +44,37 @@ pub(crate) fn fresh_starts(
     if candidate.meta.shows != Shows::NeverNegative || !lost {
         return Vec::new();
     }
+    let given = nominal.given;
+    let mut bases = vec![declared(given)];
+    for input in 0..given.plant.inputs.len() {
+        let mut runs = nominal.holdout.runs.to_vec();
+        for signal in measured_at(given, &candidate.at) {
+            runs = unfolded(&runs, signal, input);
+        }
+        bases.extend(fitted_to(given, &runs, nominal));
+    }
     let known = BTreeMap::new();
-    let given = declared(nominal.given);
-    let begun = starts(candidate, &given, &known, duration);
-    let scattered = begun.first().and_then(|first| {
-        let mut model = candidate.model.clone();
-        let parameters = model.parameters.iter_mut();
-        for (parameter, given) in parameters.zip(&nominal.given.parameters) {
-            parameter.value = given.value;
-        }
-        for i in candidate.own() {
-            model.parameters[i].free = false;
-            model.parameters[i].value = Some(first[i]);
-        }
-        let problem = nominal.problem(&model, Some(&nominal.solution.states))?;
-        problem.scattered_values(first).ok()
-    });
-    begun
-        .into_iter()
-        .chain(scattered.into_iter().flatten())
-        .collect()
+    let of = |base: &Vec<f64>| starts(candidate, base, &known, duration);
+    bases.iter().flat_map(of).collect()
+}
+
+/// Values of a `model` fitted to `runs` in place of those of the diagnosis; none where no fit gets anywhere.
+fn fitted_to(model: &Model, runs: &[Run], nominal: &Nominal<'_>) -> Option<Vec<f64>> {
+    let seen = nominal.holdout.seen.as_deref();
+    let work = nominal.work.silently();
+    let mut problem = Problem::with(model, runs, seen, None, work).ok()?;
+    let arrived = problem.arrive(&FitSettings::default(), FINAL).ok()?;
+    Some(problem.solution(&arrived.solution).values)
+}
+
+/// The measured signals at some channels.
+fn measured_at(model: &Model, at: &[&str]) -> Vec<usize> {
+    let channels = model.plant.channels.iter().filter(|c| at.contains(&c.id));
+    let signal = |c: &Channel| match c.place {
+        Place::Output(index) => model.measured.iter().position(|m| m.index == index),
+        _ => None,
+    };
+    channels.filter_map(signal).collect()
 }
 
 /// Values to start a candidate from where `simpler` ended.

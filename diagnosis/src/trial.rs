@@ -100,11 +100,7 @@ impl<'a> Nominal<'a> {
 
     /// The problem of fitting `model` to the fitting data. Initial states that are not known are estimated. None
     /// where the work was cancelled.
-    pub(crate) fn problem<'m>(
-        &self,
-        model: &'m Model,
-        known: Option<&[DVector<f64>]>,
-    ) -> Option<Problem<'m>>
+    fn problem<'m>(&self, model: &'m Model, known: Option<&[DVector<f64>]>) -> Option<Problem<'m>>
     where
         'a: 'm,
     {

@@ -110,10 +110,18 @@ fn a_power_law_is_found_with_its_exponent() {
     finds_under(Experiment::Mixed, Hidden::InputPower, 1.0, 7);
 }
 
-/// The plain model leaves as much as a constant would, so the search begins afresh.
+/// The plain model leaves as much as a constant would, so the search begins afresh; also where the file has no values
+/// to begin with.
 #[test]
 fn a_sensor_without_direction_is_found() {
     finds(Hidden::SensorMagnitude, 1.0, 1);
+    let mut log = log(&[(Hidden::SensorMagnitude, 1.0)], Experiment::Prbs, 2);
+    let lines = log.model_toml.lines();
+    let lines = lines.filter(|l| !l.starts_with("K_A") && !l.starts_with("K_C"));
+    log.model_toml = lines.map(|l| format!("{l}\n")).collect();
+    let found = judge(&log, None);
+    assert_eq!(found.missing.unwrap().effect, "sensor_magnitude");
+    assert!(found.candidates[0].nrmse < 1.1 * log.floor());
 }
 
 /// Found by what happens at command zero, with the electrical share of the damping.
