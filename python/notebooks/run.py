@@ -89,6 +89,7 @@ def execute(notebook: Any, name: str) -> list[str]:
         # Over sockets of the file system: over TCP the kernel warns.
         manager = AsyncKernelManager(kernel_name="python3", transport="ipc", ip=f"{sockets}/kernel")
         client = NotebookClient(notebook, km=manager, timeout=300, resources={"metadata": {"path": str(FOLDER)}})
+        client.owns_km = True  # it ends the kernel, too
         try:
             client.execute()
         except CellExecutionError as failed:
