@@ -23,8 +23,9 @@ from ._engines import cores, engine_named
 
 #: What tells one log of a fleet from another.
 KEY = ("robot", "time", "path")
-#: Rows that come before the table of results is written anew.
-ROWS = 200
+#: Rows that come before the table of results is written anew, and as a share of those it has: the work for all
+#: writing grows with the rows, not with their square.
+ROWS, SHARE = 200, 0.25
 
 
 def improve(
@@ -93,7 +94,8 @@ def improve(
     run = engine_named(engine)
     with journal.open("a", encoding="utf-8") as log, _bar(progress, len(rows), len(found)) as bar:
         results = run(_task, tasks, workers or cores(), retries)
-        for count, (at, row) in enumerate(results, start=1):
+        unwritten = 0
+        for at, row in results:
             if isinstance(row, str):
                 row = {**pending[at], "status": "fault", "fault": row}
             found[_key(row)] = row
@@ -102,9 +104,11 @@ def improve(
             os.fsync(log.fileno())
             if bar is not None:
                 bar.update(1)
-            if count % ROWS == 0:
+            unwritten += 1
+            if unwritten >= max(ROWS, SHARE * len(found)):
                 _write(pandas, target, found)
                 log.truncate(0)
+                unwritten = 0
     _write(pandas, target, found)
     journal.unlink(missing_ok=True)
     return pandas.read_parquet(target)
