@@ -1,5 +1,7 @@
 //! What the engine answers, of whatever kind.
 
+use std::sync::Arc;
+
 use loopsight::Watch;
 use loopsight::answers::{
     AddAnswer, CompareAnswer, DiagnoseAnswer, ExperimentAnswer, FitAnswer, ImproveAnswer,
@@ -16,6 +18,8 @@ use crate::watched::watched;
 
 /// Makes the page of an answer; the argument stands at its foot.
 type Page = dyn Fn(&str) -> String + Send + Sync;
+/// Makes the series of an answer.
+type AllSeries = dyn Fn() -> Vec<Series> + Send + Sync;
 
 /// An answer: its JSON, and what else came with it.
 #[pyclass(frozen, module = "loopsight._engine")]
@@ -23,7 +27,7 @@ pub struct Answer {
     json: String,
     model: Option<loopsight::Model>,
     log: Option<loopsight::Log>,
-    series: Vec<Series>,
+    series: Option<Box<AllSeries>>,
     page: Option<Box<Page>>,
 }
 
@@ -50,7 +54,11 @@ impl Answer {
     /// `measured`, `model`, `residual`, `one_step`.
     fn series<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let array = |values: &[f64]| PyArray1::from_slice(py, values);
-        let of = self.series.iter().map(|series| {
+        let Some(make) = &self.series else {
+            return Ok(Vec::new());
+        };
+        let all = py.detach(make);
+        let of = all.iter().map(|series| {
             let row = PyDict::new(py);
             let of = match series.of {
                 SeriesOf::Model => "model",
@@ -96,7 +104,7 @@ impl Answer {
             json: answer.to_json()?,
             model: None,
             log: None,
-            series: Vec::new(),
+            series: None,
             page: None,
         })
     }
@@ -115,9 +123,9 @@ impl Answer {
         }
     }
 
-    fn with_series(self, series: Option<Vec<Series>>) -> Self {
+    fn with_series(self, series: impl Fn() -> Vec<Series> + Send + Sync + 'static) -> Self {
         Self {
-            series: series.unwrap_or_default(),
+            series: Some(Box::new(series)),
             ..self
         }
     }
@@ -130,28 +138,24 @@ impl Answer {
     }
 }
 
-/// What an answer of the library becomes here. `series`: its JSON has the series, too; for pictures they are
-/// kept in any case.
+/// What an answer of the library becomes here.
 pub(crate) trait IntoAnswer {
-    fn into_answer(self, series: bool) -> loopsight::Result<Answer>;
+    fn into_answer(self) -> loopsight::Result<Answer>;
 }
 
-/// The series of an answer, which leave it where its JSON is not to have them.
-fn taken(of: &mut Option<Vec<Series>>, keep: bool) -> Option<Vec<Series>> {
-    if keep { of.clone() } else { of.take() }
-}
-
-/// Answers with series and a page, and with the model that `$model` finds in them.
+/// Answers with series and a page, both made when they are asked for, and with the model that `$model` finds in
+/// them.
 macro_rules! pictured {
     ($($answer:ident: $model:expr;)*) => {$(
         impl IntoAnswer for $answer {
-            fn into_answer(mut self, series: bool) -> loopsight::Result<Answer> {
-                let series = taken(&mut self.series, series);
+            fn into_answer(self) -> loopsight::Result<Answer> {
                 let model: fn(&$answer) -> Option<&loopsight::Model> = $model;
                 let plain = Answer::plain(&self)?.with_model(model(&self));
+                let this = Arc::new(self);
+                let other = Arc::clone(&this);
                 Ok(plain
-                    .with_series(series)
-                    .with_page(move |command| self.page(command)))
+                    .with_series(move || other.all_series())
+                    .with_page(move |command| this.page(command)))
             }
         }
     )*};
@@ -165,25 +169,25 @@ pictured! {
 }
 
 impl IntoAnswer for RunAnswer {
-    fn into_answer(self, _: bool) -> loopsight::Result<Answer> {
+    fn into_answer(self) -> loopsight::Result<Answer> {
         Ok(Answer::plain(&self)?.with_page(move |command| self.page(command)))
     }
 }
 
 impl IntoAnswer for AddAnswer {
-    fn into_answer(self, _: bool) -> loopsight::Result<Answer> {
+    fn into_answer(self) -> loopsight::Result<Answer> {
         Ok(Answer::plain(&self)?.with_model(Some(self.model())))
     }
 }
 
 impl IntoAnswer for SimulateAnswer {
-    fn into_answer(self, _: bool) -> loopsight::Result<Answer> {
+    fn into_answer(self) -> loopsight::Result<Answer> {
         Ok(Answer::plain(&self)?.with_log(self.log().clone()))
     }
 }
 
 impl IntoAnswer for ExperimentAnswer {
-    fn into_answer(self, _: bool) -> loopsight::Result<Answer> {
+    fn into_answer(self) -> loopsight::Result<Answer> {
         let plain = Answer::plain(&self)?;
         if !self.answers() {
             return Ok(plain);
@@ -201,20 +205,18 @@ impl IntoAnswer for ExperimentAnswer {
 pub(crate) fn long<A: IntoAnswer + Send>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
-    series: bool,
     work: impl FnOnce(Watch) -> loopsight::Result<A> + Send,
 ) -> PyResult<Answer> {
     let answer = watched(py, progress, work)?;
-    answered(py, Ok(answer), series)
+    answered(py, Ok(answer))
 }
 
 /// An answer of the library as Python gets it.
 pub(crate) fn answered<A: IntoAnswer>(
     py: Python<'_>,
     answer: loopsight::Result<A>,
-    series: bool,
 ) -> PyResult<Answer> {
     answer
-        .and_then(|answer| answer.into_answer(series))
+        .and_then(IntoAnswer::into_answer)
         .map_err(|error| raised(py, &error))
 }

@@ -23,8 +23,10 @@ pub(crate) fn inspect(
     plant: Option<String>,
     inputs: Vec<String>,
     outputs: Vec<String>,
+    period_s: Option<f64>,
 ) -> PyResult<Answer> {
     let mut options = InspectOptions::default();
+    options.period_s = period_s;
     if let Some(plant) = plant {
         options = options.plant(plant);
     }
@@ -94,5 +96,5 @@ pub(crate) fn run(
             .watch(watch);
         session.run(&control, &options)
     };
-    long(py, None, series, work)
+    long(py, None, work)
 }

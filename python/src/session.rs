@@ -75,10 +75,10 @@ impl Session {
         progress: Progress<'_, '_>,
     ) -> PyResult<Answer> {
         let work = |watch| {
-            let options = CompareOptions::default().series(true).watch(watch);
+            let options = CompareOptions::default().series(series).watch(watch);
             self.0.compare(&options)
         };
-        long(py, progress, series, work)
+        long(py, progress, work)
     }
 
     fn fit(
@@ -90,7 +90,7 @@ impl Session {
         series: bool,
         progress: Progress<'_, '_>,
     ) -> PyResult<Answer> {
-        let mut options = FitOptions::default().series(true).method(match method {
+        let mut options = FitOptions::default().series(series).method(match method {
             "output-error" => Method::OutputError,
             "rls" => Method::Rls,
             other => {
@@ -111,7 +111,7 @@ impl Session {
             options = options.max_iterations(most);
         }
         let work = |watch| self.0.fit(&options.watch(watch));
-        long(py, progress, series, work)
+        long(py, progress, work)
     }
 
     fn diagnose(
@@ -121,10 +121,10 @@ impl Session {
         progress: Progress<'_, '_>,
     ) -> PyResult<Answer> {
         let work = |watch| {
-            let options = DiagnoseOptions::default().series(true).watch(watch);
+            let options = DiagnoseOptions::default().series(series).watch(watch);
             self.0.diagnose(&options)
         };
-        long(py, progress, series, work)
+        long(py, progress, work)
     }
 
     fn improve(
@@ -134,14 +134,14 @@ impl Session {
         progress: Progress<'_, '_>,
     ) -> PyResult<Answer> {
         let work = |watch| {
-            let options = ImproveOptions::default().series(true).watch(watch);
+            let options = ImproveOptions::default().series(series).watch(watch);
             self.0.improve(&options)
         };
-        long(py, progress, series, work)
+        long(py, progress, work)
     }
 
     fn add(&self, py: Python<'_>, effect: &str, at: Vec<String>) -> PyResult<Answer> {
-        answered(py, self.0.add(&AddOptions::new(effect).at(at)), false)
+        answered(py, self.0.add(&AddOptions::new(effect).at(at)))
     }
 
     #[expect(clippy::too_many_arguments, reason = "the options, by name")]
@@ -170,7 +170,7 @@ impl Session {
         options.limit = limit;
         options.duration_s = duration_s;
         let work = |watch| self.0.experiment(&options.watch(watch));
-        long(py, progress, false, work)
+        long(py, progress, work)
     }
 
     fn simulate(
@@ -186,6 +186,6 @@ impl Session {
         };
         let experiment = experiment.map_err(|error| raised(py, &error))?;
         let options = SimulateOptions::new(experiment);
-        answered(py, py.detach(|| self.0.simulate(&options)), false)
+        answered(py, py.detach(|| self.0.simulate(&options)))
     }
 }

@@ -169,6 +169,8 @@ def test_parts_explain_themselves() -> None:
     assert "mistake" in str(ls.check(HIDDEN / "truth.toml")) and "oscillator" in str(ls.check(MODEL))
     assert ls.explain("coulomb_friction").to_dict()["schema"].startswith("loopsight/explain/")
     assert ls.check(MODEL).to_dict()["schema"].startswith("loopsight/check/")
+    bare = ls.Log.from_bytes(b"u_V,speed_rpm\n" + b"6,1.5\n5,2.5\n" * 20, "bare.csv")
+    assert "period_s = 0.02" in ls.inspect(bare, period_s=0.02).model_toml
     told = ls.inspect(LOG).to_dict()
     assert told["plants"] and told["channels"]
 

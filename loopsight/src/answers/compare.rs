@@ -39,14 +39,23 @@ impl Answer for CompareAnswer {
 
 impl CompareAnswer {
     pub(crate) fn new(engine: Comparison, about: About, with_series: bool) -> Self {
-        Self {
+        let mut this = Self {
             schema: Self::SCHEMA,
             errors: ModelErrors::from(&engine),
             summary: words::comparison(&engine),
-            series: with_series.then(|| series(SeriesOf::Model, &engine)),
+            series: None,
             about,
             engine,
+        };
+        if with_series {
+            this.series = Some(this.all_series());
         }
+        this
+    }
+
+    /// The series of numbers, sample by sample.
+    pub fn all_series(&self) -> Vec<Series> {
+        series(SeriesOf::Model, &self.engine)
     }
 
     /// Sentences that belong beside the numbers.

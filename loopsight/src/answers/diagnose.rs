@@ -134,9 +134,15 @@ impl DiagnoseAnswer {
             shown,
         };
         if with_series {
-            this.series = Some(two_series(this.before().as_ref(), this.after().as_ref()));
+            this.series = Some(this.all_series());
         }
         this
+    }
+
+    /// The series of numbers, sample by sample, of the model as it is and of the best explanation: made when they
+    /// are asked for, by two free runs.
+    pub fn all_series(&self) -> Vec<Series> {
+        two_series(self.before().as_ref(), self.after().as_ref())
     }
 
     /// The model as it is over what is shown.

@@ -108,7 +108,7 @@ impl Answer for FitAnswer {
 
 impl FitAnswer {
     pub(crate) fn new(engine: Fit, model: Model, about: About, with_series: bool) -> Self {
-        Self {
+        let mut this = Self {
             schema: Self::SCHEMA,
             errors: ModelErrors::from(&engine.comparison),
             parameters: estimates(&engine.parameters),
@@ -121,11 +121,20 @@ impl FitAnswer {
             flat: engine.flat.clone(),
             cancelled: engine.cancelled,
             summary: words::fit(&engine),
-            series: with_series.then(|| series(SeriesOf::Fitted, &engine.comparison)),
+            series: None,
             about,
             engine,
             model,
+        };
+        if with_series {
+            this.series = Some(this.all_series());
         }
+        this
+    }
+
+    /// The series of numbers, sample by sample, of the fitted model.
+    pub fn all_series(&self) -> Vec<Series> {
+        series(SeriesOf::Fitted, &self.engine.comparison)
     }
 
     /// An error if the fit did not converge, with the reason and what was tried.

@@ -172,10 +172,15 @@ impl ImproveAnswer {
             }
         }
         if with_series {
-            let (before, after) = (this.before(), this.after());
-            this.series = Some(two_series(before.as_ref(), after.as_ref()));
+            this.series = Some(this.all_series());
         }
         this
+    }
+
+    /// The series of numbers, sample by sample, of the first model and of the best one: made when they are asked
+    /// for, by two free runs.
+    pub fn all_series(&self) -> Vec<Series> {
+        two_series(self.before().as_ref(), self.after().as_ref())
     }
 
     /// The best model: the text it was made from with its comments, the effects added and the values

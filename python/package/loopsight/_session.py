@@ -271,7 +271,12 @@ def run(
 
 
 def inspect(
-    log: LogLike, *, plant: str | None = None, inputs: list[str] = [], outputs: list[str] = []
+    log: LogLike,
+    *,
+    plant: str | None = None,
+    inputs: list[str] = [],
+    outputs: list[str] = [],
+    period_s: float | None = None,
 ) -> Result:
     """What is in a log, which plants could fit it, and the model file that would read it.
 
@@ -283,8 +288,11 @@ def inspect(
         Id of the plant to map the log on.
     inputs, outputs : list of str
         The channels that are inputs of the machine, and those that were measured.
+    period_s : float, optional
+        Time between samples of a log that has no time stamps, s.
     """
-    return Result(_engine.inspect(log_of(log)._engine, plant, list(inputs), list(outputs)), "")
+    answer = _engine.inspect(log_of(log)._engine, plant, list(inputs), list(outputs), period_s)
+    return Result(answer, "")
 
 
 def _session(model: ModelLike, log: LogLike | None, options: dict[str, Any]) -> tuple[Session, dict[str, Any]]:
