@@ -46,7 +46,13 @@ pub fn write_library(folder: &Path) -> Result<(), HiddenError> {
         let at = truth.map_or(String::new(), |h| h.at.join(", "));
         let values = truth.map_or(String::new(), values);
         let doc = truth.map_or(effect.doc(), |h| h.doc);
-        let change = percent(visibility(robot, effect, 1.0, robot.lesson(), SEED)?);
+        let change = percent(visibility(
+            robot,
+            effect,
+            1.0,
+            robot.lesson(Some(effect)),
+            SEED,
+        )?);
         let words = [robot.name(), doc, &at, &values, &change];
         row(&mut index, &name, words, &log, &test);
     }
@@ -108,7 +114,7 @@ fn write_pair(
     effects: &[(Hidden, f64)],
 ) -> Result<(Recording, Recording), HiddenError> {
     fs::create_dir_all(folder).map_err(|e| io(folder, e))?;
-    let lesson = robot.lesson();
+    let lesson = robot.lesson(effects.first().map(|(effect, _)| *effect));
     let log = record(robot, effects, lesson, SEED)?;
     log.write_csv(&folder.join(format!("{}.csv", lesson.name())))?;
     let test = record(robot, effects, Experiment::MultiLevel, SEED + 1)?;

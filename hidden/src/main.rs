@@ -88,10 +88,10 @@ fn table() -> Result<(), HiddenError> {
         "effect", "size", "floor"
     );
     for (robot, effect) in catalogue() {
-        for size in [0.5, 1.0, 2.0] {
+        for size in effect.sizes() {
             let mut change = String::new();
             let mut left = String::new();
-            let log = record(robot, &[(effect, size)], robot.lesson(), 1)?;
+            let log = record(robot, &[(effect, size)], robot.lesson(Some(effect)), 1)?;
             let fit = refit(&log);
             for experiment in Experiment::ALL {
                 let share = visibility(robot, effect, size, experiment, 1)?;

@@ -58,7 +58,7 @@ fn equal_seeds_give_equal_recordings() {
         assert_eq!(a.run.inputs(), make(&[], experiment, 5).run.inputs());
     }
     for (robot, effect) in catalogue().split_off(Hidden::ALL.len()) {
-        let log = |seed| record(robot, &[(effect, 1.0)], robot.lesson(), seed).unwrap();
+        let log = |seed| record(robot, &[(effect, 1.0)], robot.lesson(Some(effect)), seed).unwrap();
         assert_eq!(log(5).run, log(5).run);
         assert_ne!(log(5).run, log(6).run);
     }
@@ -93,12 +93,14 @@ fn counting_is_the_only_noise() {
 #[test]
 fn every_effect_shows_more_the_larger_it_is() {
     for (robot, effect) in catalogue() {
-        let change = |size| visibility(robot, effect, size, robot.lesson(), 3).unwrap();
-        let changes = [0.5, 1.0, 2.0].map(change);
+        let lesson = robot.lesson(Some(effect));
+        let change = |size| visibility(robot, effect, size, lesson, 3).unwrap();
+        let changes = effect.sizes().map(change);
         println!("{effect}: {changes:.4?}");
         assert!(changes[1] > 0.01, "{effect} is invisible: {changes:?}");
+        // A sensor has a direction or none: that has no size.
         assert!(
-            changes[0] < changes[1] && changes[1] < changes[2],
+            changes[0] < changes[1] && changes[1] < changes[2] || effect == Hidden::SensorMagnitude,
             "{effect}"
         );
         assert!(changes[0] > 0.003, "{effect}: {changes:?}");
@@ -252,8 +254,9 @@ fn the_committed_recordings_are_these() {
         (Robot::Twil, Hidden::WheelSlip),
         (Robot::Arm, Hidden::CoulombFriction),
         (Robot::TankPair, Hidden::DeadZone),
+        (Robot::Twil, Hidden::BridgeCoast),
     ] {
-        let lesson = robot.lesson();
+        let lesson = robot.lesson(Some(effect));
         record(robot, &[(effect, 1.0)], lesson, 1)
             .unwrap()
             .write_csv(&path)

@@ -12,7 +12,7 @@ use loopsight_plants as _;
 
 /// Fitted to a clean recording, the plant leaves of another one what rounding leaves.
 fn explained(robot: Robot) {
-    let log = record(robot, &[], robot.lesson(), 11).unwrap();
+    let log = record(robot, &[], robot.lesson(None), 11).unwrap();
     let test = record(robot, &[], Experiment::MultiLevel, 12).unwrap();
     let (model, _) = Model::from_toml("hidden", &log.model_toml).unwrap();
     let settings = FitSettings::default();

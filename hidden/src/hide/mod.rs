@@ -83,7 +83,7 @@ pub(crate) fn check(effect: Hidden, size: f64) -> Result<(), HiddenError> {
 }
 
 /// Above this size the formula of the effect makes no sense.
-fn largest(effect: Hidden) -> f64 {
+pub(crate) fn largest(effect: Hidden) -> f64 {
     match effect {
         // The centre of mass would be further out than the inertia allows.
         H::CentrifugalOffset => 2.1,
