@@ -164,8 +164,10 @@ pub(crate) fn candidates(
                 .effects
                 .iter()
                 .any(|e| e.meta.id == meta.id && e.at.iter().any(|c| at.contains(&c.id)));
-            let silent = !can_show(model, meta, &at, runs, criteria);
-            if present || silent || has_another_name(model, meta, &at) {
+            if present
+                || has_another_name(model, meta, &at)
+                || !can_show(model, meta, &at, runs, criteria)
+            {
                 continue;
             }
             let contained = model.effects.iter().position(|e| {

@@ -272,7 +272,7 @@ impl<'a> Design<'a> {
     fn certain(&self, unknown: f64) -> DMatrix<f64> {
         let nx = self.model.n_states();
         DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| {
-            let measured = self.model.measured.iter().position(|m| m.index == i);
+            let measured = self.model.measured_index(i);
             let scale = measured.map_or(unknown, |signal| self.deviation[signal]);
             let scale = if scale > 0.0 { scale } else { unknown };
             100.0 * scale * scale

@@ -31,11 +31,8 @@ pub(crate) fn can_show(
 
 /// Whether an input has values of both signs.
 fn goes_both_ways(input: usize, runs: &[Run]) -> bool {
-    let values = || {
-        runs.iter()
-            .flat_map(move |run| (0..run.len()).map(move |k| run.input(k)[input]))
-    };
-    values().any(|u| u > 0.0) && values().any(|u| u < 0.0)
+    let all = || runs.iter().flat_map(|run| values(run, input));
+    all().any(|u| u > 0.0) && all().any(|u| u < 0.0)
 }
 
 /// Whether the signal measured at a channel has hardly anything below zero.
@@ -43,7 +40,7 @@ fn never_negative(model: &Model, channel: &Channel, runs: &[Run], most: f64) -> 
     let Place::Output(index) = channel.place else {
         return false;
     };
-    let Some(signal) = model.measured.iter().position(|m| m.index == index) else {
+    let Some(signal) = model.measured_index(index) else {
         return false;
     };
     let values = runs
@@ -62,22 +59,23 @@ fn rests(channel: &Channel, runs: &[Run], least: f64) -> bool {
     let Place::Input(input) = channel.place else {
         return false;
     };
-    let sizes = |run: &'_ Run| {
-        (0..run.len())
-            .map(|k| run.input(k)[input].abs())
-            .collect::<Vec<_>>()
-    };
-    let largest = runs.iter().flat_map(sizes).fold(0.0, f64::max);
+    let all = runs.iter().flat_map(|run| values(run, input));
+    let largest = all.map(f64::abs).fold(0.0, f64::max);
+    let driven = |u: f64| u.abs() > ZERO * largest;
     let resting = |run: &Run| {
-        let sizes = sizes(run);
-        let driven = sizes.iter().position(|u| *u > ZERO * largest);
-        let after = driven.unwrap_or(run.len())..run.len().saturating_sub(1);
-        after
-            .filter(|k| sizes[*k] <= ZERO * largest)
-            .map(|k| run.time()[k + 1] - run.time()[k])
+        values(run, input)
+            .zip(run.time().windows(2))
+            .skip_while(|(u, _)| !driven(*u))
+            .filter(|(u, _)| u.abs() <= ZERO * largest)
+            .map(|(_, ends)| ends[1] - ends[0])
             .sum::<f64>()
     };
     largest > 0.0 && runs.iter().map(resting).sum::<f64>() >= least
+}
+
+/// The values of an input, sample by sample.
+fn values(run: &Run, input: usize) -> impl Iterator<Item = f64> + '_ {
+    (0..run.len()).map(move |k| run.input(k)[input])
 }
 
 #[cfg(test)]

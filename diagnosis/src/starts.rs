@@ -71,7 +71,7 @@ fn fitted_to(model: &Model, runs: &[Run], nominal: &Nominal<'_>) -> Option<Vec<f
 fn measured_at(model: &Model, at: &[&str]) -> Vec<usize> {
     let channels = model.plant.channels.iter().filter(|c| at.contains(&c.id));
     let signal = |c: &Channel| match c.place {
-        Place::Output(index) => model.measured.iter().position(|m| m.index == index),
+        Place::Output(index) => model.measured_index(index),
         _ => None,
     };
     channels.filter_map(signal).collect()

@@ -16,6 +16,18 @@ def line(what: str, hidden: set[Any], marked: set[Any]) -> list[Any]:
     return [what, len(hidden), len(hidden & marked), len(hidden - marked), len(marked - hidden)]
 
 
+def kinds(what: str, hidden: set[Any], marked: set[Any]) -> list[list[Any]]:
+    """A line for each kind of secret: the second of each pair."""
+    return [
+        line(f"{what} {kind}", *({pair for pair in both if pair[1] == kind} for both in (hidden, marked)))
+        for kind in sorted({kind for _, kind in hidden})
+    ]
+
+
+def pairs(table: pd.DataFrame) -> set[Any]:
+    return set(table[["robot", "parameter"]].itertuples(index=False, name=None))
+
+
 def judged(truth: pd.DataFrame, found: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, set[Any]]]:
     """A row for each kind of secret, and the false alarms of each question."""
     names = found["path"].map(lambda path: Path(path).name)
@@ -31,25 +43,20 @@ def judged(truth: pd.DataFrame, found: pd.DataFrame) -> tuple[pd.DataFrame, dict
     table = ls.fleet.missing(found)
     marked = {(row["robot"], row["effect"].partition("@")[0]) for row in table[table["lacks"]].to_dict("records")}
     faulty = truth[(truth["fault"] != "") & (truth["broken"] == "")]
-    pairs = set(zip(faulty["robot"], faulty["fault"], strict=True))
-    for kind in sorted({fault for _, fault in pairs}):
-        rows.append(line(f"lacks {kind}", *({pair for pair in both if pair[1] == kind} for both in (pairs, marked))))
-    false["missing"] = marked - pairs
-    rows.append(line("missing effects, all", pairs, marked))
+    lacking = set(zip(faulty["robot"], faulty["fault"], strict=True))
+    rows += kinds("lacks", lacking, marked)
+    false["missing"] = marked - lacking
+    rows.append(line("missing effects, all", lacking, marked))
 
     table = ls.fleet.trends(found)
-    marked = set(table[table["moves"]][["robot", "parameter"]].itertuples(index=False, name=None))
-    ageing, odd = (
-        set(truth[truth["role"] == role][["robot", "parameter"]].itertuples(index=False, name=None))
-        for role in ("ageing", "odd")
-    )
-    for name in sorted({parameter for _, parameter in ageing}):
-        rows.append(line(f"moves {name}", *({pair for pair in both if pair[1] == name} for both in (ageing, marked))))
+    marked = pairs(table[table["moves"]])
+    ageing, odd = (pairs(truth[truth["role"] == role]) for role in ("ageing", "odd"))
+    rows += kinds("moves", ageing, marked)
     false["trends"] = marked - ageing
     rows.append(line("trends, all", ageing, marked))
 
     table = ls.fleet.siblings(found)
-    marked = set(table[table["apart"]][["robot", "parameter"]].itertuples(index=False, name=None))
+    marked = pairs(table[table["apart"]])
     rows.append(line("apart from the first day", odd, marked & odd))
     rows.append(line("apart by ageing", ageing, marked & ageing))
     false["siblings"] = marked - ageing - odd
@@ -66,8 +73,8 @@ def main() -> None:
     found = pd.read_parquet(given.folder / "found.parquet")
     table, false = judged(truth, found)
     print(table.to_string(index=False))
-    for question, pairs in false.items():
-        for robot, what in sorted(pairs):
+    for question, alarms in false.items():
+        for robot, what in sorted(alarms):
             print(f"false alarm of {question}: {robot} {what}")
     if given.least is not None:
         for what in ("files, all kinds", "missing effects, all"):

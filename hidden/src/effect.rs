@@ -95,9 +95,8 @@ impl Hidden {
     /// Half the size that the examples have, that size and twice of it; or of the largest that makes sense a
     /// quarter, half and all.
     pub fn sizes(self) -> [f64; 3] {
-        let largest = crate::hide::largest(self);
-        let sizes = [0.25, 0.5, 1.0];
-        sizes.map(|size| size * if largest < 2.0 { largest } else { 2.0 })
+        let most = crate::hide::largest(self).min(2.0);
+        [0.25, 0.5, 1.0].map(|share| share * most)
     }
 }
 

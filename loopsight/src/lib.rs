@@ -131,6 +131,7 @@ pub use inspect::{InspectOptions, inspect, inspect_file};
 pub use list::{ListOptions, PartRole, effects_for, list};
 pub use log::{Log, LogBuilder};
 pub use loopsight_recordings::output::Written;
+pub use loopsight_report::PAGE_STYLE;
 pub use model::{Model, ModelValue};
 pub use run::{ControlledNow, InputNow, LogTo, Loop, ParameterNow, RunOptions, RunView};
 #[cfg(feature = "serial")]

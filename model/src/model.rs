@@ -228,6 +228,11 @@ impl Model {
         Ok(())
     }
 
+    /// Index among the measured signals of the plant's signal `index`; none where nothing measures it itself.
+    pub fn measured_index(&self, index: usize) -> Option<usize> {
+        self.measured.iter().position(|m| m.index == index)
+    }
+
     /// Index of a signal by id; the error is `(message, help)`.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! What the engine answers, of whatever kind.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use loopsight::Watch;
 use loopsight::answers::{
@@ -18,8 +18,8 @@ use crate::watched::watched;
 
 /// Makes the page of an answer; the argument stands at its foot.
 type Page = dyn Fn(&str) -> String + Send + Sync;
-/// Makes the series of an answer.
-type AllSeries = dyn Fn() -> Vec<Series> + Send + Sync;
+/// The series of an answer, made once, when they are asked for.
+type AllSeries = LazyLock<Vec<Series>, Box<dyn FnOnce() -> Vec<Series> + Send>>;
 
 /// An answer: its JSON, and what else came with it.
 #[pyclass(frozen, module = "loopsight._engine")]
@@ -27,7 +27,7 @@ pub struct Answer {
     json: String,
     model: Option<loopsight::Model>,
     log: Option<loopsight::Log>,
-    series: Option<Box<AllSeries>>,
+    series: Option<AllSeries>,
     page: Option<Box<Page>>,
 }
 
@@ -54,10 +54,10 @@ impl Answer {
     /// `measured`, `model`, `residual`, `one_step`.
     fn series<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let array = |values: &[f64]| PyArray1::from_slice(py, values);
-        let Some(make) = &self.series else {
+        let Some(lazy) = &self.series else {
             return Ok(Vec::new());
         };
-        let all = py.detach(make);
+        let all = py.detach(|| LazyLock::force(lazy));
         let of = all.iter().map(|series| {
             let row = PyDict::new(py);
             let of = match series.of {
@@ -123,9 +123,9 @@ impl Answer {
         }
     }
 
-    fn with_series(self, series: impl Fn() -> Vec<Series> + Send + Sync + 'static) -> Self {
+    fn with_series(self, series: impl FnOnce() -> Vec<Series> + Send + 'static) -> Self {
         Self {
-            series: Some(Box::new(series)),
+            series: Some(LazyLock::new(Box::new(series))),
             ..self
         }
     }

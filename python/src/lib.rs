@@ -20,7 +20,7 @@ mod _engine {
     #[pymodule_export]
     use crate::model::Model;
     #[pymodule_export]
-    use crate::questions::{check, explain, inspect, parts, run};
+    use crate::questions::{check, explain, inspect, page_style, parts, run};
     #[pymodule_export]
     use crate::session::Session;
 }

@@ -66,6 +66,12 @@ pub(crate) fn parts(py: Python<'_>, role: Option<&str>, plant: Option<&str>) -> 
     plain(py, Ok(loopsight::list(&options)))
 }
 
+/// The style of every page: CSS.
+#[pyfunction]
+pub(crate) fn page_style() -> &'static str {
+    loopsight::PAGE_STYLE
+}
+
 /// Whether files say what can be.
 #[pyfunction]
 pub(crate) fn check(py: Python<'_>, files: Vec<PathBuf>) -> PyResult<Answer> {

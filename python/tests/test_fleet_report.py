@@ -200,8 +200,7 @@ def test_the_page_says_it_all_and_fetches_nothing(tmp_path: Path) -> None:
 
 
 def test_a_page_of_a_fleet_has_the_style_of_all_others() -> None:
-    beside = Path(ls.fleet.__file__).parent / "page.css"
-    assert beside.read_text() == (ROOT / "report/assets/page.css").read_text()
+    assert ls._engine.page_style() == (ROOT / "report/assets/page.css").read_text()
 
 
 def test_each_log_has_its_page_and_says_what_it_cost(tmp_path: Path) -> None:
@@ -220,6 +219,7 @@ def test_each_log_has_its_page_and_says_what_it_cost(tmp_path: Path) -> None:
     assert not isinstance(empty["page"], str) and empty["status"] == "fault"
     ls.fleet.report(tmp_path / "found.parquet", tmp_path / "fleet.html")
     text = (tmp_path / "fleet.html").read_text(encoding="utf-8")
+    assert ls._engine.page_style() in text
     assert f'href="pages/{Path(good["page"]).name}"' in text
 
 

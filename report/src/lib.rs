@@ -87,7 +87,7 @@ pub use figure::{Figure, FigurePanel, FigureTrace, Style, figure_svg};
 pub use fit::fit_page;
 pub use improvement::improvement_page;
 pub use inventory::inventory_page;
-pub use page::Context;
+pub use page::{Context, PAGE_STYLE};
 pub use record::{
     ControlledTrace, InnovationTrace, InputTrace, LoopRecord, ParameterTrace, Timing,
 };

@@ -3,7 +3,8 @@
 use crate::html::{escape, list, text};
 use crate::packed::library;
 
-const STYLE: &str = include_str!("../assets/page.css");
+/// The style of every page: CSS.
+pub const PAGE_STYLE: &str = include_str!("../assets/page.css");
 const SCRIPT: &str = include_str!("../assets/page.js");
 
 /// What a page is about and where it comes from.
@@ -76,7 +77,7 @@ fn framed(context: &Context, body: &str, credits: &str, scripts: &str) -> String
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
          script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; \
          base-uri 'none'; form-action 'none'\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n\
+         <title>{title}</title>\n<style>\n{PAGE_STYLE}</style>\n</head>\n<body>\n<main>\n\
          <header><h1>{title}</h1><p class=\"about\">{about}</p></header>\n\
          {warning}{notes}{body}\
          <footer>{command}loopsight {version}{credits}.</footer>\n</main>\n\

@@ -6,9 +6,9 @@
 """
 
 from ._engines import ENGINES, engine_named
-from ._improve import effects, improve
+from ._improve import improve
 from ._report import report
-from ._statistics import missing, readings, siblings, trends
+from ._statistics import effects, missing, readings, siblings, trends
 
 __all__ = [
     "ENGINES",

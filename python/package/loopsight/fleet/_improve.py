@@ -114,35 +114,6 @@ def improve(
     return pandas.read_parquet(target)
 
 
-def effects(results: Any) -> Any:
-    """Which robots lack which effect: a table of robots and effects with the share of each robot's good logs.
-
-    Parameters
-    ----------
-    results : pandas data frame or path
-        What `improve` found.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Indexed by robot: ``logs``, ``faults``, and a column for each ``effect@channel`` with a share from 0 to 1.
-    """
-    pandas = _pandas()
-    if isinstance(results, (str, PathLike)):
-        results = pandas.read_parquet(results)
-    rows = {}
-    for robot, logs in results.groupby("robot", sort=True):
-        good = logs[logs["status"] == "done"]
-        row: dict[str, Any] = {"logs": len(logs), "faults": len(logs) - len(good)}
-        for text in good["effects"]:
-            for effect in filter(None, text.split("; ")):
-                row[effect] = row.get(effect, 0.0) + 1.0 / len(good)
-        rows[robot] = row
-    table = pandas.DataFrame.from_dict(rows, orient="index").fillna(0.0)
-    table.index.name = "robot"
-    return table
-
-
 def _task(task: dict[str, Any]) -> dict[str, Any]:
     """One log: a row in any case."""
     # Each log is a task on a processor of its own: threads within it would only wait for each other.

@@ -11,9 +11,10 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+from .._engine import page_style
 from .._files import whole
 from . import _charts
-from ._statistics import BY_CHANCE, RATE, days, missing, read, readings, siblings, trends
+from ._statistics import BY_CHANCE, RATE, apart, days, lines, missing, moving, read, readings
 
 #: Rows of a table that the page shows; the data frames have them all.
 ROWS = 400
@@ -56,8 +57,7 @@ def report(
     said = _Said(results, rate, target)
     body = "".join((said.tiles(), said.robots(), said.lacking(), said.moving(), said.apart(), said.broken(),
                     said.wild(), said.every(), said.reckoned()))  # fmt: skip
-    beside = files(__package__)
-    style = "".join(beside.joinpath(one).read_text(encoding="utf-8") for one in ("page.css", "fleet.css"))
+    style = page_style() + files(__package__).joinpath("fleet.css").read_text(encoding="utf-8")
     table = f" · results <code>{escape(name)}</code>" if name else ""
     page = (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -83,8 +83,9 @@ class _Said:
         self.folder = target.absolute().parent
         self.readings = readings(results)
         self.missing = missing(results, rate=rate)
-        self.trends = trends(results, rate=rate)
-        self.siblings = siblings(results, rate=rate)
+        through = lines(self.readings)
+        self.trends = moving(through, rate)
+        self.siblings = apart(through, rate)
         self.lacks = self.missing[self.missing["lacks"]]
         self.moves = self.trends[self.trends["moves"]]
         self.unlike = self.siblings[self.siblings["apart"]]

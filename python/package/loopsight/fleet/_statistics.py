@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -38,7 +38,7 @@ def pandas_and_scipy() -> Any:
 
 def read(results: Any) -> Any:
     """The table of results, from a path or as it is."""
-    pandas = pandas_and_scipy()
+    pandas = needed("what a fleet says needs", "pandas", "pyarrow")
     if isinstance(results, (str, PathLike)):
         if not Path(fspath(results)).is_file():
             raise Error(f"there is no table of results at {fspath(results)}", file=fspath(results))
@@ -142,8 +142,12 @@ class Fitted(NamedTuple):
     freedom: float
 
 
-def _fitted(table: Any) -> Iterator[tuple[str, str, Fitted]]:
-    """Robot, parameter, and the line through its logs.
+#: Robot, parameter, and the line through its logs.
+Line = tuple[str, str, Fitted]
+
+
+def lines(table: Any) -> list[Line]:
+    """A line for each robot and parameter of `readings`.
 
     A log counts by its standard error, but none more than the middle log of the fleet. How the logs scatter about
     the line decides where that is more than their standard errors say.
@@ -154,6 +158,7 @@ def _fitted(table: Any) -> Iterator[tuple[str, str, Fitted]]:
     sigma = np.maximum(table["std_error"].to_numpy(), middle)
     tiny = np.finfo(float).tiny ** 0.25 + 1e-12 * np.abs(table["value"].to_numpy())
     table = table.assign(sigma=np.maximum(sigma, tiny))
+    found: list[Line] = []
     for (robot, parameter), group in table.groupby(["robot", "parameter"], sort=True):
         kept = group[~group["wild"]]
         value, weight, day = (kept[name].to_numpy(dtype=float) for name in ("value", "sigma", "day"))
@@ -170,10 +175,12 @@ def _fitted(table: Any) -> Iterator[tuple[str, str, Fitted]]:
             slope_error = turning**-0.5
         scatter = math.sqrt(max(1.0, float(np.sum(weight * left**2)) / freedom)) if freedom else 1.0
         level_error = scatter * float(np.sum(weight)) ** -0.5
-        yield str(robot), str(parameter), Fitted(
+        line = Fitted(
             logs, len(group) - logs, kept["unit"].iloc[0], period, level, level_error, slope,
             scatter * slope_error, float(freedom),
         )  # fmt: skip
+        found.append((str(robot), str(parameter), line))
+    return found
 
 
 def _judged(table: Any, rate: float, mark: str) -> Any:
@@ -216,9 +223,14 @@ def trends(results: Any, *, rate: float = RATE) -> Any:
         ``slope`` per day with ``slope_low``, ``slope_high`` (95 %), ``change`` over these days with ``change_low``,
         ``change_high``; ``p``, ``q``, and whether it ``moves``.
     """
+    return moving(lines(readings(results)), rate)
+
+
+def moving(through: Iterable[Line], rate: float) -> Any:
+    """`trends` of lines."""
     pandas = pandas_and_scipy()
     rows = []
-    for robot, parameter, fit in _fitted(readings(results)):
+    for robot, parameter, fit in through:
         if not fit.slope_error > 0.0:
             continue
         p, reach = _two_sided(fit.slope / fit.slope_error, fit.freedom)
@@ -252,18 +264,23 @@ def siblings(results: Any, *, rate: float = RATE) -> Any:
         ``spread`` between siblings (one standard deviation), ``deviation`` with ``low``, ``high`` (95 %); ``p``,
         ``q``, and whether it is ``apart``.
     """
+    return apart(lines(readings(results)), rate)
+
+
+def apart(through: Iterable[Line], rate: float) -> Any:
+    """`siblings` of lines."""
     pandas = pandas_and_scipy()
     groups: dict[tuple[str, str], list[tuple[str, Fitted]]] = {}
-    for robot, parameter, fit in _fitted(readings(results)):
+    for robot, parameter, fit in through:
         groups.setdefault((parameter, "level"), []).append((robot, fit))
         if fit.slope_error > 0.0:
             groups.setdefault((parameter, "slope"), []).append((robot, fit))
-    rows = [row for (parameter, of), fits in groups.items() for row in _apart(parameter, of, fits)]
+    rows = [row for (parameter, of), fits in groups.items() for row in _beside_siblings(parameter, of, fits)]
     names = ["robot", "parameter", "unit", "of", "logs", "value", "fleet", "spread", "deviation", "low", "high", "p"]
     return _judged(pandas.DataFrame(rows, columns=names), rate, "apart")
 
 
-def _apart(parameter: str, of: str, fits: list[tuple[str, Fitted]]) -> Iterator[list[Any]]:
+def _beside_siblings(parameter: str, of: str, fits: list[tuple[str, Fitted]]) -> Iterator[list[Any]]:
     """The rows of one parameter."""
     import numpy as np
     from scipy import stats
@@ -289,6 +306,39 @@ def _apart(parameter: str, of: str, fits: list[tuple[str, Fitted]]) -> Iterator[
         reach *= math.sqrt(variance)
         yield [robot, parameter, fit.unit, of, fit.logs, float(here), fleet, math.sqrt(spread),
                off, off - reach, off + reach, p]  # fmt: skip
+
+
+def _named(text: Any) -> set[str]:
+    """The effects that a log named."""
+    return set(filter(None, text.split("; "))) if isinstance(text, str) else set()
+
+
+def effects(results: Any) -> Any:
+    """Which robots lack which effect: a table of robots and effects with the share of each robot's good logs.
+
+    Parameters
+    ----------
+    results : pandas data frame or path
+        What `improve` found.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Indexed by robot: ``logs``, ``faults``, and a column for each ``effect@channel`` with a share from 0 to 1.
+    """
+    results = read(results)
+    pandas = needed("what a fleet says needs", "pandas")
+    rows = {}
+    for robot, logs in results.groupby("robot", sort=True):
+        good = logs[logs["status"] == "done"]
+        row: dict[str, Any] = {"logs": len(logs), "faults": len(logs) - len(good)}
+        for text in good["effects"]:
+            for effect in _named(text):
+                row[effect] = row.get(effect, 0.0) + 1.0 / len(good)
+        rows[robot] = row
+    table = pandas.DataFrame.from_dict(rows, orient="index").fillna(0.0)
+    table.index.name = "robot"
+    return table
 
 
 def missing(results: Any, *, rate: float = RATE, by_chance: float = BY_CHANCE) -> Any:
@@ -321,7 +371,7 @@ def missing(results: Any, *, rate: float = RATE, by_chance: float = BY_CHANCE) -
     logs: dict[str, int] = {}
     for robot, text in zip(good["robot"].astype(str), good["effects"], strict=True):
         logs[robot] = logs.get(robot, 0) + 1
-        for effect in set(filter(None, text.split("; "))) if isinstance(text, str) else ():
+        for effect in _named(text):
             of = counts.setdefault(effect, {})
             of[robot] = of.get(robot, 0) + 1
     rows = []
