@@ -25,6 +25,8 @@ pub(crate) struct Candidate {
     pub(crate) model: Model,
     /// Root mean square of the flow at its channels in the recording; 0 where there is none.
     pub(crate) flow: f64,
+    /// The same of the position.
+    pub(crate) reach: f64,
     /// It can be tried at the measured positions: it reads a position, and no observer corrects the free runs.
     pub(crate) by_position: bool,
     /// Widths over which signs of all effects are smoothed at first, by index of the parameter.
@@ -206,6 +208,7 @@ pub(crate) fn candidates(
                         replaces: replaces.clone(),
                         by_position: !observed && Positions::matter_to(meta),
                         widths: widths(&model, rms, sign_width),
+                        reach: last_rms(&model, Role::Position, rms),
                         model,
                         flow,
                     });
@@ -219,7 +222,7 @@ pub(crate) fn candidates(
 /// Sets the smoothing width of the last effect of `model` to `sign_width` times the flow in the recording, and
 /// the command that its sizes refer to. Returns the root mean square of the flow at its channels.
 pub(crate) fn suit(model: &mut Model, rms: &[f64], sign_width: f64) -> f64 {
-    let flow = model.effects.last().map_or(0.0, |e| flow(model, e, rms));
+    let flow = last_rms(model, Role::Flow, rms);
     smooth(model, 1, sign_width * flow);
     refer(model, rms);
     flow
@@ -256,11 +259,17 @@ fn is_reference(declaration: &Parameter) -> bool {
     declaration.unit == "channel" && !declaration.estimated && !declaration.admits(0.0)
 }
 
-/// Root mean square of the flow at an effect's channels; 0 where there is none.
-fn flow(model: &Model, effect: &Attached, rms: &[f64]) -> f64 {
+/// Root mean square of a signal, by its role, at the channels of the last effect; 0 where there is none.
+fn last_rms(model: &Model, role: Role, rms: &[f64]) -> f64 {
+    let last = model.effects.last();
+    last.map_or(0.0, |effect| role_rms(model, effect, role, rms))
+}
+
+/// Root mean square of a signal, by its role, at an effect's channels; 0 where there is none.
+fn role_rms(model: &Model, effect: &Attached, role: Role, rms: &[f64]) -> f64 {
     let channels = effect.at.iter();
     channels
-        .filter_map(|c| model.find_signal(c.read(Role::Flow)?).ok())
+        .filter_map(|c| model.find_signal(c.read(role)?).ok())
         .filter_map(|i| rms.get(i).copied())
         .fold(0.0, f64::max)
 }
@@ -268,7 +277,7 @@ fn flow(model: &Model, effect: &Attached, rms: &[f64]) -> f64 {
 /// The widths that suit the recording, of all effects that have one, by index of the parameter.
 fn widths(model: &Model, rms: &[f64], sign_width: f64) -> Vec<(usize, f64)> {
     let of_effect = |effect: &Attached| {
-        let width = sign_width * flow(model, effect, rms);
+        let width = sign_width * role_rms(model, effect, Role::Flow, rms);
         let declarations = effect.meta.parameters.iter().enumerate();
         let first = effect.first_parameter;
         declarations

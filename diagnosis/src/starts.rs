@@ -127,7 +127,10 @@ fn starts(
             };
             vec![nearest(neutral + step)]
         } else {
-            listed.into_iter().map(nearest).collect()
+            // What is counted per way depends on how far the machine goes.
+            let per_way = parameter.declaration.unit == "1/position" && candidate.reach > 0.0;
+            let unit = if per_way { candidate.reach } else { 1.0 };
+            listed.into_iter().map(|v| nearest(v / unit)).collect()
         };
         all = all
             .iter()

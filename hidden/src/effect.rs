@@ -63,6 +63,7 @@ effects! {
     GravityPendulum "gravity_pendulum" Axis "an arm, horizontal at angle 0",
     LinearStiffness "linear_stiffness" Axis "a spring that pulls back to angle 0",
     CubicStiffness "cubic_stiffness" Axis "a hardening spring without linear part",
+    Hysteresis "hysteresis" Axis "a rubber joint to the ground, whose force depends on the way it came",
     CentrifugalOffset "centrifugal_offset" Twil "centre of mass ahead of the axle",
     WheelSlip "wheel_slip" Twil "tyres on a slippery floor; odometry from undriven measuring wheels",
     DeadZone "dead_zone" Twil "amplifiers that do nothing below a threshold",

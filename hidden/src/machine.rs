@@ -241,6 +241,7 @@ impl Machine {
             }
             if physics.robot == Driven::Axis {
                 torque += physics.load.torque(wheel_angle);
+                torque -= physics.joint.moved(0.5 * STEP * wheel).force;
             }
             if let Some(tyre) = physics.tyre {
                 let r = physics.body.wheel_radius;
@@ -317,6 +318,9 @@ impl Machine {
                 None => ground,
             };
             self.wheel_angles[k] += STEP * wheel;
+            if k == 0 {
+                self.physics.joint = self.physics.joint.moved(STEP * wheel);
+            }
             self.rotor_angles[k] += STEP * mean.rotor[k];
         }
         if self.physics.robot == Driven::Twil {

@@ -4,14 +4,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use loopsight_hidden::{
-    Experiment, Hidden, HiddenError, Robot, catalogue, record, record_with, refit, visibility,
-    write_library,
+    Experiment, Hidden, HiddenError, Robot, catalogue, hysteretic_benchmark, record, record_with,
+    refit, visibility, write_library,
 };
 
 const USAGE: &str = "usage:
   loopsight-hidden all -o FOLDER      write every effect's recordings and the index
   loopsight-hidden table              print how much each effect changes the signals
-  loopsight-hidden one [ROBOT:]EFFECT[=SIZE][+EFFECT[=SIZE]] prbs|multi_level|mixed SEED -o FILE.csv";
+  loopsight-hidden one [ROBOT:]EFFECT[=SIZE][+EFFECT[=SIZE]] prbs|multi_level|mixed SEED -o FILE.csv
+  loopsight-hidden benchmark SEED NOISE -o FILE.csv
+                                      the hysteretic oscillator of Noël and Schoukens (2016), noise in m";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -28,6 +30,10 @@ fn main() -> ExitCode {
                 _ => return misused(),
             }
         }
+        ["benchmark", seed, noise, "-o", file] => match (seed.parse(), noise.parse()) {
+            (Ok(seed), Ok(noise)) => benchmark(seed, noise, file),
+            _ => return misused(),
+        },
         _ => return misused(),
     };
     match done {
@@ -54,6 +60,13 @@ fn one(effects: &str, experiment: Experiment, seed: u64, file: &str) -> Result<(
     let named = Robot::ALL.into_iter().find(|r| r.name() == name);
     let robot = named.unwrap_or_else(|| hidden[0].0.home());
     let recording = record(robot, &hidden, experiment, seed)?;
+    print!("{}", recording.truth.to_toml());
+    recording.write_csv(&PathBuf::from(file))
+}
+
+/// A period of the multisine of the benchmark.
+fn benchmark(seed: u64, noise: f64, file: &str) -> Result<(), HiddenError> {
+    let recording = hysteretic_benchmark(seed, 8192, noise)?;
     print!("{}", recording.truth.to_toml());
     recording.write_csv(&PathBuf::from(file))
 }

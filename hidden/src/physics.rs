@@ -4,6 +4,7 @@ use crate::amplifier::AmplifierParts;
 use crate::contact::{Gap, Tyre};
 use crate::driven::{Body, Driven, Motor};
 use crate::friction::Friction;
+use crate::hysteresis::Hysteresis;
 use crate::motor::{Battery, Heat};
 use crate::odometry::OdometryParts;
 
@@ -84,6 +85,8 @@ pub(crate) struct Physics {
     pub(crate) gap: Option<Gap>,
     pub(crate) tyre: Option<Tyre>,
     pub(crate) load: Load,
+    /// Between the shaft of the axis and the ground.
+    pub(crate) joint: Hysteresis,
     pub(crate) slope: Option<Slope>,
     /// Centre of mass ahead of the axle, m.
     pub(crate) mass_offset: f64,
@@ -111,6 +114,7 @@ impl Physics {
             gap: None,
             tyre: None,
             load: Load::default(),
+            joint: Hysteresis::default(),
             slope: None,
             mass_offset: 0.0,
             payload: None,

@@ -255,6 +255,8 @@ fn the_committed_recordings_are_these() {
         (Robot::Arm, Hidden::CoulombFriction),
         (Robot::TankPair, Hidden::DeadZone),
         (Robot::Twil, Hidden::BridgeCoast),
+        (Robot::Axis, Hidden::Hysteresis),
+        (Robot::Oscillator, Hidden::Hysteresis),
     ] {
         let lesson = robot.lesson(Some(effect));
         record(robot, &[(effect, 1.0)], lesson, 1)

@@ -130,6 +130,12 @@ fn a_coasting_bridge_is_found_with_its_share() {
     finds_under(Experiment::Mixed, Hidden::BridgeCoast, 0.5, 7);
 }
 
+/// Found with its stiffness and the shape of its loop, beside friction and springs.
+#[test]
+fn a_joint_with_hysteresis_is_found_with_its_loop() {
+    finds(Hidden::Hysteresis, 0.5, 3);
+}
+
 /// A dead zone of the driver cannot lie behind the terminals of a motor: where the voltages were measured
 /// there, neither it nor anything else that acts before them is looked for.
 #[test]

@@ -2,6 +2,7 @@
 //! drive the machine, 0.9 V is 10 %.
 
 use crate::contact::Gap;
+use crate::hysteresis::Hysteresis;
 use crate::physics::{Cogging, Physics};
 use crate::truth::Concealed;
 
@@ -156,4 +157,20 @@ pub(super) fn hardening(m: &mut Physics, of: Concealed) -> Concealed {
     of.fitted("stiffness", stiffness, "V/rad^3")
         .fitted("rest", 0.0, "rad")
         .physical("torque_per_cube", torque, "N m/rad^3")
+}
+
+/// A joint of 1.2 V per radian that slides at 2.4 V.
+pub(super) fn hysteresis(m: &mut Physics, of: Concealed) -> Concealed {
+    let (stiffness, onward, back) = (1.2 * of.size, 0.5, 0.2);
+    let torque = stiffness * m.motor.torque_per_volt();
+    m.joint = Hysteresis {
+        stiffness: torque,
+        onward,
+        back,
+        force: 0.0,
+    };
+    of.fitted("stiffness", stiffness, "V/rad")
+        .fitted("onward", onward, "1/rad")
+        .fitted("back", back, "1/rad")
+        .physical("torque_per_angle", torque, "N m/rad")
 }

@@ -44,6 +44,7 @@ pub(crate) fn hide(
         H::GravityPendulum => effort::pendulum(machine, concealed),
         H::LinearStiffness => effort::spring(machine, concealed),
         H::CubicStiffness => effort::hardening(machine, concealed),
+        H::Hysteresis => effort::hysteresis(machine, concealed),
         H::ScrubFriction => body::scrub(machine, concealed),
         H::GravitySlope => body::slope(machine, concealed),
         H::CentrifugalOffset => body::offset(machine, concealed),
@@ -101,6 +102,7 @@ fn fits(effect: Hidden, robot: Driven) -> bool {
         | H::GravityPendulum
         | H::LinearStiffness
         | H::CubicStiffness
+        | H::Hysteresis
         | H::SensorMagnitude => robot == Driven::Axis,
         H::ScrubFriction
         | H::GravitySlope

@@ -1,6 +1,7 @@
 //! Machines that are none of motors and wheels: one command, a few sensors, a file each.
 
 mod arm;
+mod bouc_wen;
 mod cart_pole;
 mod oscillator;
 mod record;
@@ -16,6 +17,7 @@ use crate::friction::Friction;
 use crate::truth::{Concealed, Quantity};
 
 pub(crate) use arm::SHEET as ARM;
+pub use bouc_wen::hysteretic_benchmark;
 pub(crate) use cart_pole::SHEET as CART_POLE;
 pub(crate) use oscillator::SHEET as OSCILLATOR;
 pub(crate) use record::along_rig;

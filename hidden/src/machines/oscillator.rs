@@ -3,6 +3,7 @@
 use super::{Rig, Row, Scale, Sheet, dry, midpoint, quantity};
 use crate::Hidden;
 use crate::friction::Friction;
+use crate::hysteresis::Hysteresis;
 use crate::truth::{Concealed, Quantity};
 
 pub(crate) const SHEET: Sheet = Sheet {
@@ -11,7 +12,11 @@ pub(crate) const SHEET: Sheet = Sheet {
     inputs: 1,
     columns: &["time_s", "force_N", "position_m"],
     command: [0.0, 4.0],
-    shows: &[Hidden::CubicStiffness, Hidden::CoulombFriction],
+    shows: &[
+        Hidden::CubicStiffness,
+        Hidden::CoulombFriction,
+        Hidden::Hysteresis,
+    ],
     build: |phase, _| Box::new(Oscillator::new(phase)),
 };
 
@@ -26,7 +31,7 @@ const RESOLUTION: f64 = 0.4 / 1024.0;
 ///
 /// ```text
 /// impulse = mass · velocity        impulse' = F - tension(x) - damping · velocity + friction
-/// tension(x) = stiffness x + cubic x³
+/// tension(x) = stiffness x + cubic x³ + what a rubber joint pulls with
 /// ```
 #[derive(Clone, Debug)]
 pub(super) struct Oscillator {
@@ -39,6 +44,7 @@ pub(super) struct Oscillator {
     /// N/m³
     cubic: f64,
     guide: Friction,
+    joint: Hysteresis,
     sensor: Scale,
     /// Position, m, and impulse, kg m/s.
     pub(super) state: [f64; 2],
@@ -53,6 +59,7 @@ impl Oscillator {
             damping: 2.4,
             cubic: 0.0,
             guide: Friction::default(),
+            joint: Hysteresis::default(),
             sensor: Scale::new(RESOLUTION, phase[0]),
             state: [0.0; 2],
             force: 0.0,
@@ -64,12 +71,14 @@ impl Oscillator {
         let start = self.state;
         let mut end = midpoint(start, STEP, |[x, impulse]| {
             let velocity = impulse / mass;
-            let tension = (self.stiffness + self.cubic * x * x) * x;
+            let joint = self.joint.moved(x - start[0]);
+            let tension = (self.stiffness + self.cubic * x * x) * x + joint.force;
             [velocity, force - tension - self.damping * velocity]
         });
         let stop = dry(&self.guide, start[1] / mass, end[1] / mass, mass, STEP);
         end[1] += stop;
         end[0] += 0.5 * STEP * stop / mass;
+        self.joint = self.joint.moved(end[0] - start[0]);
         self.state = end;
     }
 
@@ -116,6 +125,21 @@ impl Rig for Oscillator {
                 Some(
                     of.told("dry friction of the guide", &["mass"])
                         .fitted("level", level, "N"),
+                )
+            }
+            Hidden::Hysteresis => {
+                let (stiffness, onward, back) = (120.0 * of.size, 20.0, 8.0);
+                self.joint = Hysteresis {
+                    stiffness,
+                    onward,
+                    back,
+                    force: 0.0,
+                };
+                Some(
+                    of.told("a rubber joint to the ground", &["mass"])
+                        .fitted("stiffness", stiffness, "N/m")
+                        .fitted("onward", onward, "1/m")
+                        .fitted("back", back, "1/m"),
                 )
             }
             _ => None,
