@@ -31,13 +31,17 @@ pub(crate) struct Candidate {
     pub(crate) by_position: bool,
     /// Widths over which signs of all effects are smoothed at first, by index of the parameter.
     pub(crate) widths: Vec<(usize, f64)>,
+    /// Its `[[effect]]` entries, where the library has no such effect.
+    pub(crate) entries: Option<String>,
 }
 
 impl Candidate {
     /// Parameters of the model that the candidate brought, by index.
     pub(crate) fn own(&self) -> std::ops::Range<usize> {
+        let first = self.model.effects.len() - self.instances();
+        let effect = self.model.effects.get(first);
         let n = self.model.parameters.len();
-        n - self.instances() * self.meta.parameters.len()..n
+        effect.map_or(n, |e| e.first_parameter)..n
     }
 
     /// How many times the effect is in the model.
@@ -48,11 +52,11 @@ impl Candidate {
     /// The name of one of its own parameters, by index in the model, as it is reported.
     pub(crate) fn name(&self, index: usize) -> String {
         let id = self.model.parameters[index].declaration.id;
-        if self.separate {
-            let instance = (index - self.own().start) / self.meta.parameters.len().max(1);
-            format!("{id}@{}", self.at[instance])
-        } else {
-            id.to_owned()
+        let mut effects = self.model.effects.iter().rev();
+        let of = effects.find(|e| e.first_parameter <= index);
+        match of.and_then(|effect| effect.at.first()) {
+            Some(channel) if self.separate => format!("{id}@{}", channel.id),
+            _ => id.to_owned(),
         }
     }
 
@@ -211,6 +215,7 @@ pub(crate) fn candidates(
                         reach: last_rms(&model, Role::Position, rms),
                         model,
                         flow,
+                        entries: None,
                     });
                 }
             }

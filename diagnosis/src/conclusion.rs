@@ -68,6 +68,9 @@ pub struct Explanation {
     /// The model with it, fitted.
     #[serde(skip)]
     pub model: Model,
+    /// Its `[[effect]]` entries, where the library has no such effect.
+    #[serde(skip)]
+    pub entries: Option<String>,
     /// Free-run error on what it was fitted to; NaN as `significance`.
     #[serde(skip)]
     pub nrmse_fit: f64,

@@ -7,6 +7,7 @@ use crate::candidates::candidates;
 use crate::conclude::{Evidence, REPORTED, conclude};
 use crate::conclusion::{Conclusion, Diagnosis, Level};
 use crate::criteria::Criteria;
+use crate::discover::discovered;
 use crate::error::FitError;
 use crate::explain::explain_look;
 use crate::floor::floor;
@@ -39,15 +40,36 @@ pub fn diagnose(
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<Diagnosis, FitError> {
-    let least = work.criteria().missing.least_share;
-    diagnose_above(model, measurements, least, work)
+    let aim = Aim {
+        least: work.criteria().missing.least_share,
+        discover: Discover::Never,
+    };
+    diagnose_for(model, measurements, aim, work)
 }
 
-/// As [`diagnose`], where an explanation must account for at least the share `least` of the standard deviation.
-pub(crate) fn diagnose_above(
+/// What a diagnosis is for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Aim {
+    /// Least share of the standard deviation that an explanation must account for.
+    pub(crate) least: f64,
+    pub(crate) discover: Discover,
+}
+
+/// When an expression for the residual force is a candidate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Discover {
+    Never,
+    /// Where none of them explains the rest.
+    Last,
+    /// It is the only candidate.
+    Only,
+}
+
+/// As [`diagnose`], for an aim.
+pub(crate) fn diagnose_for(
     model: &Model,
     measurements: &Measurements<'_>,
-    least: f64,
+    aim: Aim,
     work: &Work<'_>,
 ) -> Result<Diagnosis, FitError> {
     measurements.check(model)?;
@@ -56,7 +78,7 @@ pub(crate) fn diagnose_above(
     if refused(&mut diagnosis, model, measurements, work.criteria()) {
         return Ok(diagnosis);
     }
-    match steps(&mut diagnosis, model, measurements, least, work) {
+    match steps(&mut diagnosis, model, measurements, aim, work) {
         Ok(()) | Err(FitError::Cancelled(Cancelled)) => Ok(diagnosis),
         Err(error) => Err(error),
     }
@@ -107,7 +129,7 @@ fn steps(
     diagnosis: &mut Diagnosis,
     model: &Model,
     measurements: &Measurements<'_>,
-    least: f64,
+    aim: Aim,
     work: &Work<'_>,
 ) -> Result<(), FitError> {
     let silent = work.silently();
@@ -131,7 +153,11 @@ fn steps(
         work: &silent,
     };
     diagnosis.where_it_fails = where_it_fails(&plain.model, &plain.solution, runs, work)?;
-    let finalists = search(diagnosis, &nominal, work)?;
+    let mut finalists = match aim.discover {
+        Discover::Only => Vec::new(),
+        Discover::Never | Discover::Last => search(diagnosis, &nominal, work)?,
+    };
+    let mut explanations = diagnosis.candidates.clone();
     let evidence = Evidence {
         nominal: &nominal,
         unseen: &plain.judgement.losses,
@@ -139,13 +165,26 @@ fn steps(
         floor: diagnosis.floor.nrmse,
         floor_fit: floor(model, runs, &criteria.log),
         predictable: predictable(&plain.model, &plain.solution, runs, work)?,
-        least,
+        least: aim.least,
     };
-    let verdict = conclude(diagnosis, &finalists, &evidence);
+    let mut verdict = conclude(diagnosis, &finalists, &evidence);
     if verdict == Conclusion::UnknownEffect {
         work.tell(Stage::ResidualForce, 0, 1);
-        diagnosis.residual_force =
-            residual_force::of_solution(&plain.model, &plain.solution, runs, work)?;
+        let force = residual_force::of_solution(&plain.model, &plain.solution, runs, work)?;
+        let expression = force.as_ref().and_then(|f| f.expression.as_ref());
+        if let Some((judged, explanation)) = expression
+            .filter(|_| aim.discover != Discover::Never)
+            .and_then(|expression| discovered(expression, &nominal))
+        {
+            let better = |other: &Judged| other.error() > judged.error();
+            let place = finalists.iter().position(better).unwrap_or(finalists.len());
+            finalists.insert(place, judged);
+            explanations.insert(place, explanation);
+            diagnosis.candidates = explanations;
+            verdict = conclude(diagnosis, &finalists, &evidence);
+        }
+        diagnosis.residual_force = force.filter(|_| verdict == Conclusion::UnknownEffect);
+        work.go_on()?;
     }
     diagnosis.advice.extend(sufficiency::notes(model, runs));
     diagnosis.verdict = verdict;

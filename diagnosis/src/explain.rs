@@ -32,6 +32,7 @@ pub(crate) fn explain(
         indistinguishable_from: Vec::new(),
         note: note(fit, candidate),
         model: fit.model.clone(),
+        entries: candidate.entries.clone(),
         nrmse_fit: nrmse(&fitted),
     })
 }
@@ -50,6 +51,7 @@ pub(crate) fn explain_look(judged: &Judged) -> Explanation {
         indistinguishable_from: Vec::new(),
         note: note(&fit, candidate),
         model: fit.model,
+        entries: candidate.entries.clone(),
         nrmse_fit: f64::NAN,
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::Criteria;
-use crate::diagnose::diagnose_above;
+use crate::diagnose::{Aim, Discover, diagnose_for};
 use crate::error::FitError;
 use crate::fit::fit;
 use crate::fitted::Fit;
@@ -10,10 +10,13 @@ use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
 use crate::progress::{Cancelled, Work};
 use crate::refine::{blurs, is_undetermined, refine, still_open, take_values, without_step};
-use crate::settings::{FitSettings, Method};
+use crate::settings::{FitSettings, ImproveSettings, Method};
 use loopsight_model::model::Model;
 
 /// Repeats [`diagnose`](crate::diagnose()), adding what it finds missing, until it finds nothing more.
+///
+/// Where no effect of the library explains the rest, and `settings` say so, an expression for the residual force is a
+/// candidate as well: its coefficients are fitted with the model's, and it is judged on the same data by the same rules.
 ///
 /// An improvement that is cancelled has the finished steps, the model of the last of them as the best one, and
 /// the verdict [`Conclusion::Cancelled`].
@@ -24,9 +27,32 @@ use loopsight_model::model::Model;
 pub fn improve(
     model: &Model,
     measurements: &Measurements<'_>,
+    settings: &ImproveSettings,
     work: &Work<'_>,
 ) -> Result<Improvement, FitError> {
-    let mut state = State::new(model);
+    if !settings.discover {
+        return improve_with(model, measurements, Discover::Never, work);
+    }
+    let found = improve_with(model, measurements, Discover::Last, work)?;
+    let stood_in = found.verdict == Conclusion::UnknownEffect && found.steps.len() > 1;
+    if !stood_in {
+        return Ok(found);
+    }
+    // Effects of the library that took a part of the error may have stood in for what it does not have.
+    let other = improve_with(model, measurements, Discover::Only, work)?;
+    let left = |found: &Improvement| found.steps.last().map_or(f64::INFINITY, |s| s.nrmse_test);
+    let better = left(&other) < work.criteria().improve.better * left(&found);
+    Ok(if better { other } else { found })
+}
+
+/// [`improve`] with or without expressions.
+fn improve_with(
+    model: &Model,
+    measurements: &Measurements<'_>,
+    discover: Discover,
+    work: &Work<'_>,
+) -> Result<Improvement, FitError> {
+    let mut state = State::new(model, discover);
     let verdict = loop {
         let diagnosis = state.diagnose(measurements, work)?;
         let verdict = diagnosis.verdict;
@@ -48,6 +74,8 @@ pub fn improve(
 /// An improvement in progress.
 struct State {
     present: Model,
+    /// When an expression is a candidate.
+    discover: Discover,
     /// What it was before the last step: the fit without that step begins there.
     before: Option<Model>,
     steps: Vec<ImprovementStep>,
@@ -55,9 +83,10 @@ struct State {
 }
 
 impl State {
-    fn new(model: &Model) -> Self {
+    fn new(model: &Model, discover: Discover) -> Self {
         Self {
             present: model.clone(),
+            discover,
             before: None,
             steps: Vec::new(),
             diagnoses: Vec::new(),
@@ -75,12 +104,17 @@ impl State {
         let criteria = work.criteria();
         let (worth, least) = (criteria.improve.worth, criteria.missing.least_share);
         let least = first.map_or(least, |nrmse| (worth * nrmse).max(least));
-        let diagnosis = diagnose_above(&self.present, measurements, least, &work.in_round(round))?;
+        let aim = Aim {
+            least,
+            discover: self.discover,
+        };
+        let diagnosis = diagnose_for(&self.present, measurements, aim, &work.in_round(round))?;
         if let Some(fitted) = &diagnosis.model
             && self.steps.is_empty()
         {
             self.steps.push(ImprovementStep {
                 added: None,
+                entries: None,
                 round,
                 nrmse_fit: diagnosis.nominal_fit,
                 nrmse_test: diagnosis.nominal.nrmse,
@@ -101,6 +135,7 @@ impl State {
     ) -> Result<(), FitError> {
         self.steps.push(ImprovementStep {
             added: Some(best.place),
+            entries: best.entries,
             round,
             nrmse_fit: best.nrmse_fit,
             nrmse_test: best.nrmse,

@@ -10,6 +10,9 @@ use crate::fitted::Fit;
 pub struct ImprovementStep {
     /// What was added, under the name that it has in the best model; `null` for the model as it was.
     pub added: Option<EffectAt>,
+    /// The `[[effect]]` entries of what was added, where the library has no such effect.
+    #[serde(skip)]
+    pub entries: Option<String>,
     /// The round whose diagnosis named it: its place among [`Improvement::diagnoses`].
     #[serde(skip)]
     pub round: usize,

@@ -74,6 +74,7 @@ mod conclusion;
 pub mod criteria;
 mod derived;
 mod diagnose;
+mod discover;
 mod equivalent;
 mod error;
 mod estimate;
@@ -141,5 +142,5 @@ pub use residual_force::{
     ForceBin, ForceCurve, ForceDependence, ForceExpression, ResidualForce, residual_force,
 };
 pub use score::SignalScore;
-pub use settings::{FitSettings, Method, Scheme};
+pub use settings::{FitSettings, ImproveSettings, Method, Scheme};
 pub use where_it_fails::Statement;

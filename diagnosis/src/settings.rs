@@ -33,3 +33,10 @@ impl Default for FitSettings {
         }
     }
 }
+
+/// Settings of an improvement.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ImproveSettings {
+    /// Where no effect of the library explains the rest, an expression for the residual force is a candidate, too.
+    pub discover: bool,
+}

@@ -1,6 +1,6 @@
 //! Improving a model: diagnose, add the missing effect, refit, until nothing more is missing.
 
-use loopsight_diagnosis::improve;
+use loopsight_diagnosis::{ImproveSettings, ImprovementStep, improve};
 use loopsight_model::config::{PathSegment, TomlSource};
 use loopsight_model::model::{Attached, Model as Composed, ModelParameter};
 
@@ -14,6 +14,9 @@ use crate::watch::{Watch, watched};
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct ImproveOptions {
+    /// Whether, where no effect of the library explains the rest, an expression for the missing force is added as an
+    /// effect of the model file's own; by default it is only shown.
+    pub discover: bool,
     /// Whether the answer has the series of numbers, sample by sample; by default it has not.
     pub series: bool,
     /// Who gets the progress, and what stops the work.
@@ -23,6 +26,13 @@ pub struct ImproveOptions {
 watched!(ImproveOptions);
 
 impl ImproveOptions {
+    /// Whether an expression is added where no effect of the library explains the rest.
+    #[must_use]
+    pub fn discover(mut self, discover: bool) -> Self {
+        self.discover = discover;
+        self
+    }
+
     /// Whether the answer has the series of numbers, sample by sample.
     #[must_use]
     pub fn series(mut self, series: bool) -> Self {
@@ -41,10 +51,14 @@ impl Session {
     pub fn improve(&self, options: &ImproveOptions) -> Result<ImproveAnswer> {
         let data = self.data()?;
         let work = options.watch.work();
-        let engine = improve(&data.model, &data.measurements(), &work)?;
+        let settings = ImproveSettings {
+            discover: options.discover,
+        };
+        let engine = improve(&data.model, &data.measurements(), &settings, &work)?;
         let model = match &engine.best {
             Some(best) => {
-                let text = improved_text(&self.model.source()?, &data.model, &best.model);
+                let source = self.model.source()?;
+                let text = improved_text(&source, &data.model, &best.model, &engine.steps);
                 Some(Model::from_toml(&self.model.file, &text)?)
             }
             None => None,
@@ -59,8 +73,14 @@ impl Session {
     }
 }
 
-/// The text of a model with exactly the effects of `best` and all fitted values.
-fn improved_text(source: &TomlSource, before: &Composed, best: &Composed) -> String {
+/// The text of a model with exactly the effects of `best` and all fitted values. `steps` have the entries of effects
+/// that the library does not have.
+fn improved_text(
+    source: &TomlSource,
+    before: &Composed,
+    best: &Composed,
+    steps: &[ImprovementStep],
+) -> String {
     let is = |a: &Attached, b: &Attached| {
         a.meta.id == b.meta.id && a.at.iter().map(|c| c.id).eq(b.at.iter().map(|c| c.id))
     };
@@ -75,8 +95,19 @@ fn improved_text(source: &TomlSource, before: &Composed, best: &Composed) -> Str
             edit(&|present| present.without_effect(index));
         }
     }
+    let mut written: Vec<&str> = Vec::new();
     for effect in &best.effects {
         if before.effects.iter().any(|e| is(e, effect)) {
+            continue;
+        }
+        let id = effect.meta.id;
+        let named = |step: &&ImprovementStep| step.added.as_ref().is_some_and(|a| a.effect == id);
+        if let Some(entries) = steps.iter().find(named).and_then(|s| s.entries.as_deref()) {
+            // One for all of its channels, or one for each: written at the first of them.
+            if !written.contains(&id) {
+                edit(&|present| present.with_entries(entries));
+                written.push(id);
+            }
             continue;
         }
         let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();

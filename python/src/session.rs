@@ -130,11 +130,15 @@ impl Session {
     fn improve(
         &self,
         py: Python<'_>,
+        discover: bool,
         series: bool,
         progress: Progress<'_, '_>,
     ) -> PyResult<Answer> {
         let work = |watch| {
-            let options = ImproveOptions::default().series(series).watch(watch);
+            let options = ImproveOptions::default()
+                .discover(discover)
+                .series(series)
+                .watch(watch);
             self.0.improve(&options)
         };
         long(py, progress, work)

@@ -53,6 +53,7 @@ fn explanation(place: EffectAt, nrmse: f64, name: &str) -> Explanation {
         verdict: ParameterVerdict::Good,
     };
     Explanation {
+        entries: None,
         place,
         nrmse,
         parameters: BTreeMap::from([(name.to_owned(), estimate)]),
@@ -146,6 +147,7 @@ pub(crate) fn improvement(last: Conclusion) -> Improvement {
     let best = diagnosis(last).model.is_some().then(fit);
     let step = |added, nrmse_fit, nrmse_test| ImprovementStep {
         round: 0,
+        entries: None,
         still_open: Vec::new(),
         added,
         nrmse_fit,

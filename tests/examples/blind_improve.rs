@@ -9,7 +9,7 @@
 //! * `pairs`: two effects hidden at once; both must be named.
 //! * `small`: friction of 3 % of full drive, ten seeds.
 
-use loopsight_diagnosis::{Improvement, Measurements, Work, improve};
+use loopsight_diagnosis::{ImproveSettings, Improvement, Measurements, Work, improve};
 use loopsight_hidden::{Experiment, Hidden, Recording, record_with};
 use loopsight_model::model::Model;
 use loopsight_plants as _;
@@ -69,7 +69,13 @@ fn logs(hidden: &[(Hidden, f64)], kind: Experiment, seed: u64) -> Option<(Record
 fn improved(log: &Recording, unseen: &Recording) -> Option<(Improvement, f64, f64)> {
     let (model, _) = Model::from_toml("hidden", &log.model_toml).ok()?;
     let runs = [log.run.clone()];
-    let found = improve(&model, &Measurements::new(&runs), &Work::quiet()).ok()?;
+    let found = improve(
+        &model,
+        &Measurements::new(&runs),
+        &ImproveSettings::default(),
+        &Work::quiet(),
+    )
+    .ok()?;
     let best = &found.best.as_ref()?.model;
     let error = loopsight_diagnosis::compare(
         best,

@@ -15,8 +15,8 @@ use loopsight_core::{Derived, Parameter, Plant, PlantMeta, Real};
 use loopsight_diagnosis::fit;
 use loopsight_diagnosis::{
     CancelToken, Cancelled, CompareError, Conclusion, Diagnosis, ExperimentLimits, FitError,
-    FitSettings, Measurements, Method, Progress, Question, QuestionError, Work, compare, diagnose,
-    experiment, improve, residual_force,
+    FitSettings, ImproveSettings, Measurements, Method, Progress, Question, QuestionError, Work,
+    compare, diagnose, experiment, improve, residual_force,
 };
 use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_model::declare_plant;
@@ -237,7 +237,15 @@ fn an_improvement_keeps_its_finished_steps() {
     let _one = counting();
     let (model, run) = (rough(), log());
     let runs = std::slice::from_ref(&run);
-    let work = |w: &Work<'_>| improve(&model, &Measurements::new(runs), w).unwrap();
+    let work = |w: &Work<'_>| {
+        improve(
+            &model,
+            &Measurements::new(runs),
+            &ImproveSettings::default(),
+            w,
+        )
+        .unwrap()
+    };
     let steps = AtomicU64::new(0);
     at_random(4, 7, work, |improvement| {
         assert_eq!(improvement.verdict, Conclusion::Cancelled);

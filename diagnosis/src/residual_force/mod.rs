@@ -4,6 +4,7 @@
 mod blocks;
 mod dependence;
 mod filter;
+mod known;
 mod place;
 mod response;
 mod select;
@@ -178,7 +179,7 @@ pub(crate) fn of_solution(
         .map(|c| found.group.channels[*c].id.to_owned())
         .collect();
     let expression = (!laws.is_empty()).then(|| {
-        let (toml, force) = written(&found.group, &laws);
+        let (toml, force) = written(model, &found.group, &laws);
         ForceExpression {
             force,
             share_of_variance: share,

@@ -76,11 +76,19 @@ impl Group {
         let mut quantities: Vec<Quantity> = Vec::new();
         let mut series: Vec<Vec<Vec<f64>>> = vec![Vec::new(); channels.len()];
         let mut seen: Vec<Vec<usize>> = Vec::new();
-        for role in Role::ALL {
+        let roles = Role::ALL.into_iter().filter_map(|role| {
             let played: Option<Vec<usize>> = channels.iter().map(|c| index(c, role)).collect();
-            let Some(played) = played.filter(|p| !seen.contains(p)) else {
+            Some((Variable::Role(role), played?))
+        });
+        // What is measured elsewhere in the machine may act here, too.
+        let elsewhere = model.measured.iter().filter_map(|m| {
+            let signal = signals(model.plant).nth(m.index)?;
+            Some((Variable::Signal(signal.id), vec![m.index; channels.len()]))
+        });
+        for (variable, played) in roles.chain(elsewhere) {
+            if seen.contains(&played) {
                 continue;
-            };
+            }
             let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
             let (mut squares, mut n) = (0.0, 0.0);
             for (to, signal) in series.iter_mut().zip(&played) {
@@ -100,7 +108,7 @@ impl Group {
                 .map_or("1", |s| s.unit)
                 .to_owned();
             quantities.push(Quantity {
-                variable: Variable::Role(role),
+                variable,
                 turns: turns(&unit, low, high),
                 unit,
                 rms: (squares / f64::max(n, 1.0)).sqrt(),

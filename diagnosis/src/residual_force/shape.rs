@@ -9,6 +9,8 @@ use loopsight_core::Role;
 pub(super) enum Variable {
     /// A signal of the plant in a role.
     Role(Role),
+    /// A signal of the plant by its own name, the same at every channel.
+    Signal(&'static str),
     /// Time since the start of the run.
     Time,
 }
@@ -39,6 +41,7 @@ impl Variable {
     pub(super) fn name(self) -> &'static str {
         match self {
             Variable::Role(role) => role.id(),
+            Variable::Signal(id) => id,
             Variable::Time => "time",
         }
     }
@@ -156,6 +159,12 @@ pub(super) fn terms(quantities: &[Quantity]) -> Vec<Term> {
         quantities.iter().find(|q| q.variable == variable)
     };
     let flow = of(Role::Flow);
+    let positions: Vec<&Quantity> = (quantities.iter())
+        .filter(|q| {
+            let elsewhere = matches!(q.variable, Variable::Signal(_));
+            elsewhere || q.variable == Variable::Role(Role::Position)
+        })
+        .collect();
     for q in quantities {
         let x = q.variable;
         let mut singles = vec![Shape::Is(x), Shape::Magnitude(x)];
@@ -206,6 +215,12 @@ pub(super) fn terms(quantities: &[Quantity]) -> Vec<Term> {
             for factor in [direction.clone(), Shape::Is(x), Shape::Magnitude(x)] {
                 all.extend(waves(*angle, &factor));
             }
+        }
+    }
+    // What lies between two places.
+    for (i, a) in positions.iter().enumerate() {
+        for b in &positions[i + 1..] {
+            all.push(vec![Shape::Is(a.variable).times(&Shape::Is(b.variable))]);
         }
     }
     if let Some(drive) = of(Role::Drive) {

@@ -1,11 +1,15 @@
 //! The residual force in words, and its expression as TOML.
 
 use loopsight_model::expression::{EffectDraft, ParameterDraft};
+use loopsight_model::model::Model;
 
 use super::dependence::ForceDependence;
+use super::known::resembles;
 use super::place::{Group, Law};
 use super::shape::{Shape, Variable};
 
+/// Name of an effect that is made of a residual force.
+const NAME: &str = "discovered";
 /// Quantities that are named.
 const NAMED: usize = 3;
 /// Significant digits of a number in an expression.
@@ -73,15 +77,28 @@ pub(super) fn statement(
 }
 
 /// `[[effect]]` entries, and the force with its numbers.
-pub(super) fn written(group: &Group, laws: &[Law]) -> (String, String) {
-    let drafts: Vec<(EffectDraft, String)> = laws.iter().map(|law| draft(group, law)).collect();
+pub(super) fn written(model: &Model, group: &Group, laws: &[Law]) -> (String, String) {
+    let name = free_name(model);
+    let drafts: Vec<(EffectDraft, String)> =
+        laws.iter().map(|law| draft(&name, group, law)).collect();
     let toml: Vec<String> = drafts.iter().map(|(d, _)| d.to_toml()).collect();
     let forces: Vec<&str> = drafts.iter().map(|(_, f)| f.as_str()).collect();
     (toml.join("\n"), forces.join("; "))
 }
 
+/// A name that no effect of the model has: `discovered`, `discovered_2`, and so on.
+fn free_name(model: &Model) -> String {
+    let mut name = NAME.to_owned();
+    let mut number = 1;
+    while model.effects.iter().any(|e| e.meta.id == name) {
+        number += 1;
+        name = format!("{NAME}_{number}");
+    }
+    name
+}
+
 /// A law as an effect with parameters, and as one line with numbers.
-fn draft(group: &Group, law: &Law) -> (EffectDraft, String) {
+fn draft(name: &str, group: &Group, law: &Law) -> (EffectDraft, String) {
     let unit = group.channels[law.at[0]].unit;
     let mut parameters = Vec::new();
     let mut scales: Vec<ParameterDraft> = Vec::new();
@@ -140,11 +157,12 @@ fn draft(group: &Group, law: &Law) -> (EffectDraft, String) {
             unit: coefficient_unit(group, unit, shape),
             range: None,
             held: false,
-            doc: String::new(),
+            doc: resembles(shape).map_or_else(String::new, |known| format!("acts like {known}")),
         });
     }
     parameters.extend(scales);
     let draft = EffectDraft {
+        name: name.to_owned(),
         at: law
             .at
             .iter()

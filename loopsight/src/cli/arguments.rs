@@ -337,6 +337,9 @@ pub(crate) struct ImproveArguments {
     /// Validate on this log; without it, on parts of LOG that are held out of the fits.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,
+    /// Where no effect of the library explains the rest, add an expression for the missing force, fit it and go on.
+    #[arg(long)]
+    pub(crate) discover: bool,
     /// Write the best model here: the model file with the effects added and all values fitted.
     #[arg(short, long, value_name = "BEST")]
     pub(crate) output: Option<PathBuf>,

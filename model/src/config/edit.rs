@@ -32,16 +32,20 @@ impl TomlSource {
         }
         let mut entry = toml_edit::Table::new();
         entry.insert(id, Item::Table(part));
-        let effects = document
-            .entry("effect")
-            .or_insert(Item::ArrayOfTables(toml_edit::ArrayOfTables::new()));
-        match effects {
-            Item::ArrayOfTables(effects) => effects.push(entry),
-            // `effect = []`, as an inline array
-            other => {
-                let mut effects = toml_edit::ArrayOfTables::new();
-                effects.push(entry);
-                *other = Item::ArrayOfTables(effects);
+        push_effect(&mut document, entry);
+        document.to_string()
+    }
+
+    /// The text with the `[[effect]]` entries of `entries` at the end of those it has.
+    pub fn with_entries(&self, entries: &str) -> String {
+        let parsed = [&self.text, entries].map(str::parse::<toml_edit::DocumentMut>);
+        let [Ok(mut document), Ok(mut more)] = parsed else {
+            return self.text.clone();
+        };
+        if let Some(Item::ArrayOfTables(more)) = more.remove("effect") {
+            for mut entry in more {
+                place_anew(&mut entry);
+                push_effect(&mut document, entry);
             }
         }
         document.to_string()
@@ -85,6 +89,33 @@ impl TomlSource {
 }
 
 /// Sets the number at `path` below `item`, keeping what stands around it.
+/// Puts an `[[effect]]` behind those that a document has.
+fn push_effect(document: &mut toml_edit::DocumentMut, entry: toml_edit::Table) {
+    let effects = document
+        .entry("effect")
+        .or_insert(Item::ArrayOfTables(toml_edit::ArrayOfTables::new()));
+    match effects {
+        Item::ArrayOfTables(effects) => effects.push(entry),
+        // `effect = []`, as an inline array
+        other => {
+            let mut effects = toml_edit::ArrayOfTables::new();
+            effects.push(entry);
+            *other = Item::ArrayOfTables(effects);
+        }
+    }
+}
+
+/// Lets a table of another document, and the tables in it, stand where they are put: their places in that document
+/// mean nothing in this one.
+fn place_anew(table: &mut toml_edit::Table) {
+    table.set_position(None);
+    for (_, item) in table.iter_mut() {
+        if let Item::Table(inner) = item {
+            place_anew(inner);
+        }
+    }
+}
+
 fn set_value(item: &mut Item, path: &[PathSegment], value: f64) {
     match path {
         [] => {}
@@ -144,5 +175,27 @@ mod tests {
             new,
             "# robot\n[plant.a]\nk = -2.5 # first\n\n[[effect]]\n[effect.b]\nat = [\"x\"]\nlevel = 0.25\n"
         );
+    }
+
+    #[test]
+    fn entries_stand_behind_those_of_the_file() {
+        let entry = "[[effect]]\n[effect.own]\nforce = \"c\"\n\n[effect.own.parameters]\nc = 2.0\n";
+        let file = "# mine\n[[effect]]\n[effect.drag]\nlevel = 1.0 # kept\n\n[log]\ntime = \"t\"\n";
+        let with = TomlSource::parse("m.toml", file)
+            .unwrap()
+            .with_entries(entry);
+        let document: toml::Table = with.parse().unwrap();
+        let effects = document["effect"].as_array().unwrap();
+        assert_eq!(effects[0]["drag"]["level"].as_float(), Some(1.0));
+        assert_eq!(effects[1]["own"]["parameters"]["c"].as_float(), Some(2.0));
+        assert!(with.starts_with("# mine\n") && with.contains("# kept"));
+        // A file without effects, and one with an empty list of them.
+        for file in ["", "effect = []\n"] {
+            let with = TomlSource::parse("m.toml", file)
+                .unwrap()
+                .with_entries(entry);
+            let document: toml::Table = with.parse().unwrap();
+            assert_eq!(document["effect"].as_array().unwrap().len(), 1, "{with}");
+        }
     }
 }

@@ -26,6 +26,7 @@ pub struct ParameterDraft {
 /// use loopsight_model::expression::{EffectDraft, ParameterDraft};
 ///
 /// let draft = EffectDraft {
+///     name: "my_friction".to_owned(),
 ///     at: vec!["shaft".to_owned()],
 ///     force: "-c * tanh(flow / s)".to_owned(),
 ///     summary: "friction".to_owned(),
@@ -52,6 +53,7 @@ pub struct ParameterDraft {
 ///     draft.to_toml(),
 ///     r#"[[effect]]
 /// [effect.expression]
+/// name = "my_friction"
 /// summary = "friction"
 /// at = ["shaft"]
 /// force = "-c * tanh(flow / s)"
@@ -64,6 +66,8 @@ pub struct ParameterDraft {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EffectDraft {
+    /// Its name in reports, and of its parameters; may be empty.
+    pub name: String,
     /// The channels it acts on.
     pub at: Vec<String>,
     /// What is added there, in the channel's unit. Names: the roles of the channel (`flow`,
@@ -81,6 +85,9 @@ impl EffectDraft {
         let mut part = Table::new();
         // Right below `[[effect]]`, as the other entries of the examples stand.
         part.decor_mut().set_prefix("");
+        if !self.name.is_empty() {
+            part.insert("name", toml_edit::value(&self.name));
+        }
         if !self.summary.is_empty() {
             part.insert("summary", toml_edit::value(&self.summary));
         }

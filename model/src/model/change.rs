@@ -1,11 +1,19 @@
 //! A composed model with effects added, replaced or removed.
 
 use loopsight_core::Channel;
+use serde::Deserialize;
 
 use super::{Attached, Model, ModelParameter};
-use crate::attach::{bind, make_names_unique, misfit};
-use crate::config::PathSegment;
-use crate::registry;
+use crate::attach::{attach, bind, make_names_unique, misfit};
+use crate::config::{ConfigError, PathSegment, TomlSource};
+use crate::registry::{self, EffectPart};
+
+/// `[[effect]]` entries alone.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entries {
+    effect: Vec<Box<dyn EffectPart>>,
+}
 
 impl Model {
     /// The model with the effect `id` added at the channels `at`, with the effect's default
@@ -31,6 +39,31 @@ impl Model {
         model.effects.push(attached);
         make_names_unique(&mut model.parameters, &model.effects);
         Some(model)
+    }
+
+    /// The model with the effects of `[[effect]]` entries added; `entries` is their TOML.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] where the text has anything else, or an effect that does not fit the plant.
+    pub fn with_entries(&self, entries: &str) -> Result<Model, Box<ConfigError>> {
+        let source = TomlSource::parse("the added effects", entries)?;
+        let parsed: Entries = source.read()?;
+        let mut model = self.clone();
+        for (index, part) in parsed.effect.iter().enumerate() {
+            let first = model.parameters.len();
+            let parameters = &mut model.parameters;
+            let attached = attach(self.plant, part.as_ref(), index, parameters, &source)?;
+            // They stand behind the effects that the model has.
+            for parameter in &mut model.parameters[first..] {
+                if let Some(place) = parameter.path.get_mut(1) {
+                    *place = model.effects.len().into();
+                }
+            }
+            model.effects.push(attached);
+        }
+        make_names_unique(&mut model.parameters, &model.effects);
+        Ok(model)
     }
 
     /// The model with its `index`-th effect replaced by the effect `id` at the channels `at`;

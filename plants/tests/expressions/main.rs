@@ -454,6 +454,7 @@ fn a_draft_is_a_model_file() {
         doc: "with \"quotes\" and a \\".to_owned(),
     };
     let draft = EffectDraft {
+        name: "fading".to_owned(),
         at: vec!["wheel.right".to_owned(), "wheel.left".to_owned()],
         force: "-a * flow - b".to_owned(),
         summary: String::new(),
@@ -463,7 +464,7 @@ fn a_draft_is_a_model_file() {
         ],
     };
     let model = model(&format!("{TWIL}\n{}", draft.to_toml()));
-    assert_eq!(model.missing_values(), ["expression.a"]);
+    assert_eq!(model.missing_values(), ["fading.a"]);
     let [.., a, b] = model.parameters.as_slice() else {
         panic!()
     };

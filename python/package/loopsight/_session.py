@@ -135,11 +135,12 @@ class Session:
         with reporting(progress) as report:
             return Diagnosis(self._engine.diagnose(series, report), self._call("diagnose"))
 
-    def improve(self, *, series: bool = False, progress: Progress = False) -> Improvement:
+    def improve(self, *, discover: bool = False, series: bool = False, progress: Progress = False) -> Improvement:
         """Adds what is missing and refits, until nothing more is. `Result.model` is the model that came of
-        it. Arguments as for `compare`."""
+        it. With ``discover`` an expression for the missing force is added where no effect of the library explains
+        the rest. Other arguments as for `compare`."""
         with reporting(progress) as report:
-            return Improvement(self._engine.improve(series, report), self._call("improve"))
+            return Improvement(self._engine.improve(discover, series, report), self._call("improve"))
 
     def experiment(
         self,

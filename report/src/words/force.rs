@@ -11,7 +11,7 @@ pub(crate) fn text(force: Option<&ResidualForce>) -> String {
     let mut text = format!("\nresidual force: {}", force.statement);
     if let Some(expression) = &force.expression {
         text.push_str(&format!(
-            "\n\na first expression, for the end of the model file (then fit and edit it):\n\n{}",
+            "\n\na first expression, for the end of the model file (then fit and edit it; `improve --discover` does so):\n\n{}",
             expression.toml.trim_end()
         ));
     }

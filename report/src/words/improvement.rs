@@ -44,6 +44,12 @@ pub fn said(improvement: &Improvement) -> Said {
         error(first.nrmse_test),
         error(end.nrmse_test)
     )];
+    because.extend(
+        improvement
+            .steps
+            .iter()
+            .flat_map(|step| written(improvement, step)),
+    );
     because.push(rest(improvement.verdict, &error(last.floor.nrmse)));
     because.extend((improvement.best.iter()).flat_map(|best| fit::not_shown(&best.model)));
     because.extend(
@@ -61,6 +67,29 @@ pub fn said(improvement: &Improvement) -> Said {
             .chain(not_pinned(improvement, &added))
             .collect(),
     }
+}
+
+/// What an effect of the model file's own says, and which known physics its terms resemble: for each of its channels, or
+/// for all alike.
+fn written(improvement: &Improvement, step: &ImprovementStep) -> Vec<String> {
+    let (Some(best), Some(added), Some(_)) = (&improvement.best, &step.added, &step.entries) else {
+        return Vec::new();
+    };
+    let effects = best.model.effects.iter();
+    effects
+        .filter(|effect| effect.meta.id == added.effect)
+        .map(|effect| {
+            let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
+            let law = effect.meta.equation.trim_start_matches("w = ");
+            let mut text = format!("{} at {} is {law}", added.effect, enumerated(&at));
+            for parameter in effect.meta.parameters.iter().filter(|p| p.estimated) {
+                if !parameter.doc.is_empty() {
+                    text.push_str(&format!("; {} {}", parameter.id, parameter.doc));
+                }
+            }
+            text + "."
+        })
+        .collect()
 }
 
 /// What is still missing at the end.

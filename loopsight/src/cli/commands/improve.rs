@@ -18,6 +18,7 @@ pub(crate) fn run(arguments: &ImproveArguments) -> Result<()> {
     )?;
     let bar = Bar::new();
     let options = ImproveOptions::default()
+        .discover(arguments.discover)
         .series(arguments.series)
         .watch(bar.watch());
     let answer = session.improve(&options);

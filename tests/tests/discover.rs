@@ -1,0 +1,191 @@
+//! `improve` with [`ImproveSettings::discover`]: what no effect of the library is, found as an expression.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "helpers of tests: a failure is the test's failure"
+)]
+
+use loopsight_diagnosis::{Conclusion, ImproveSettings, Improvement, Measurements, Work, improve};
+use loopsight_model::excitation::{Excitation, Sequence};
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+use loopsight_plants as _;
+
+const PERIOD: f64 = 0.01;
+const STEPS: usize = 100;
+
+/// Rates of the states at time (s), with the inputs.
+type Rates = fn(time: f64, u: &[f64], x: &[f64]) -> Vec<f64>;
+
+/// A machine from first principles, and the model that lacks something.
+struct Machine {
+    inputs: &'static [&'static str],
+    states: usize,
+    /// Which states are measured, and the standard deviation of the noise.
+    measured: &'static [usize],
+    noise: f64,
+    rates: Rates,
+    model: &'static str,
+}
+
+/// A recording: semi-implicit Euler at 0.1 ms, an integrator that no model uses. States come as speed, position pairs.
+fn record(machine: &Machine, seconds: f64, seed: u64) -> Run {
+    let commands: Vec<Sequence> = (0..)
+        .zip(machine.inputs)
+        .map(|(i, name)| {
+            let levels = Excitation::MultiLevel {
+                amplitude: 9.0,
+                hold_s: 0.5,
+                levels: 7,
+                seed: seed + i,
+                common: false,
+            };
+            levels.build(name).unwrap()
+        })
+        .collect();
+    let mut noise = noise(seed);
+    let h = PERIOD / STEPS as f64;
+    let mut x = vec![0.0; machine.states];
+    let mut run = Run::empty(machine.inputs.len(), machine.measured.len());
+    for k in 0..=(seconds / PERIOD) as usize {
+        let time = PERIOD * k as f64;
+        let u: Vec<f64> = commands.iter().map(|c| c.sample(time)).collect();
+        let measured = machine.measured.iter();
+        let y: Vec<f64> = measured.map(|i| x[*i] + machine.noise * noise()).collect();
+        run.push(time, &u, &y).unwrap();
+        for step in 0..STEPS {
+            let now = time + h * step as f64;
+            for i in 0..x.len() {
+                x[i] += h * (machine.rates)(now, &u, &x)[i];
+            }
+        }
+    }
+    run
+}
+
+/// Noise of variance one: the sum of twelve uniform numbers.
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    move || {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            sum += (state >> 11) as f64 / (1u64 << 53) as f64;
+        }
+        sum
+    }
+}
+
+/// Improves the machine's model with one recording, judged on another.
+fn discover(machine: &Machine) -> Improvement {
+    let model = Model::from_toml("machine", machine.model).unwrap().0;
+    let [log, test] = [1, 20].map(|seed| record(machine, 30.0, seed));
+    let measurements =
+        Measurements::new(std::slice::from_ref(&log)).tested_on(Some(std::slice::from_ref(&test)));
+    let settings = ImproveSettings { discover: true };
+    improve(&model, &measurements, &settings, &Work::quiet()).unwrap()
+}
+
+/// The error at the end is at the floor, with the discovered `law` alone. Each of its parameters has its `truth` in its
+/// 95 % interval, widened by a thousandth for the integrator.
+fn is_found(found: &Improvement, law: &str, truth: &[(&str, f64)]) {
+    let steps: Vec<_> = found
+        .steps
+        .iter()
+        .map(|s| s.added.as_ref().map(|a| &a.effect))
+        .collect();
+    let best = found.best.as_ref().unwrap();
+    assert_eq!(steps.len(), 2, "{steps:?}");
+    assert_eq!(best.model.effects[0].meta.equation, format!("w = {law}"));
+    assert_eq!(found.verdict, Conclusion::NothingMissing);
+    let floor = found.diagnoses.last().unwrap().floor.nrmse;
+    let left = found.steps[1].nrmse_test;
+    assert!(left < 1.1 * floor, "{left} above the floor {floor}");
+    for (name, value) in truth {
+        let [low, high] = best.parameters[*name].interval95.unwrap();
+        let slack = 1e-3 * value.abs();
+        let holds = (low - slack..=high + slack).contains(value);
+        assert!(holds, "{name}: {low} … {high}, expected {value}");
+    }
+}
+
+const AXIS: &str = "[plant.dc_axis]\n[log.measured]\nspeed = { column = \"speed\" }\n";
+
+/// An amplifier that is stronger to one side: `u + 0.03 u²`.
+#[test]
+fn the_curve_of_an_amplifier_is_found() {
+    let machine = Machine {
+        inputs: &["voltage"],
+        states: 1,
+        measured: &[0],
+        noise: 0.02,
+        rates: |_, u, x| vec![6.0 * (u[0] + 0.03 * u[0] * u[0]) - 2.0 * x[0]],
+        model: AXIS,
+    };
+    let truth = [("discovered.c", 0.03), ("K_C", 6.0), ("K_A", -2.0)];
+    is_found(&discover(&machine), "c * drive^2", &truth);
+}
+
+/// A contact that corrodes: the current falls by a half per cent each second, whatever drives it.
+#[test]
+fn a_resistance_that_grows_with_time_is_found() {
+    let machine = Machine {
+        inputs: &["voltage"],
+        states: 1,
+        measured: &[0],
+        noise: 0.02,
+        rates: |t, u, x| vec![(1.0 - 0.005 * t) * (6.0 * u[0] - 1.5 * x[0]) - 0.5 * x[0]],
+        model: AXIS,
+    };
+    let law = "c1 * drive * time + c2 * flow * time";
+    let truth = [
+        ("discovered.c1", -0.005),
+        ("discovered.c2", 0.00125),
+        ("K_C", 6.0),
+    ];
+    is_found(&discover(&machine), law, &truth);
+}
+
+/// Two sledges on springs. The force on the first is in proportion to both positions.
+#[test]
+fn a_force_that_depends_on_two_positions_is_found() {
+    let machine = Machine {
+        inputs: &["f1", "f2"],
+        states: 4,
+        measured: &[1, 3],
+        noise: 5e-4,
+        rates: |_, u, x| {
+            vec![
+                u[0] - 1.2 * x[0] - 20.0 * x[1] - 15.0 * x[1] * x[3],
+                x[0],
+                (u[1] - 1.5 * x[2] - 30.0 * x[3]) / 1.5,
+                x[2],
+            ]
+        },
+        model: r#"
+[plant.expression.states]
+v1 = { unit = "m/s", rate = "f1 + first - d1 * v1 - k1 * x1" }
+x1 = { unit = "m", rate = "v1" }
+v2 = { unit = "m/s", rate = "(f2 + second - d2 * v2 - k2 * x2) / 1.5" }
+x2 = { unit = "m", rate = "v2" }
+[plant.expression.inputs]
+f1 = { unit = "N" }
+f2 = { unit = "N" }
+[plant.expression.channels]
+first = { unit = "N", flow = "v1", position = "x1", drive = "f1" }
+second = { unit = "N", flow = "v2", position = "x2", drive = "f2" }
+[plant.expression.parameters]
+d1 = { value = 1.0, unit = "N s/m", range = [0.0, 50.0] }
+k1 = { value = 15.0, unit = "N/m", range = [0.0, 500.0] }
+d2 = { value = 1.0, unit = "N s/m", range = [0.0, 50.0] }
+k2 = { value = 25.0, unit = "N/m", range = [0.0, 500.0] }
+[log.measured]
+x1 = { column = "x1" }
+x2 = { column = "x2" }
+"#,
+    };
+    let truth = [("discovered.c", -15.0), ("k1", 20.0), ("d2", 1.5)];
+    is_found(&discover(&machine), "c * position * x2", &truth);
+}
