@@ -8,6 +8,7 @@ use crate::conclude::{Evidence, REPORTED, conclude};
 use crate::conclusion::{Conclusion, Diagnosis, Level};
 use crate::criteria::Criteria;
 use crate::discover::discovered;
+use crate::ending::{Read, finalists_on_all, plain_on_all};
 use crate::error::FitError;
 use crate::explain::explain_look;
 use crate::floor::floor;
@@ -28,6 +29,8 @@ use crate::where_it_fails::{predictable, where_it_fails};
 
 /// Adds every effect of the library to `model` at every channel it fits, and refits all parameters each time.
 /// Each is judged by its free run on validation data.
+///
+/// The search reads windows of a long log; everything that was measured has the last word.
 ///
 /// A diagnosis that is cancelled says so ([`Conclusion::Cancelled`]). It has what was found until then: the
 /// fitted model, where it fails, and the candidates that were judged.
@@ -133,9 +136,10 @@ fn steps(
     work: &Work<'_>,
 ) -> Result<(), FitError> {
     let silent = work.silently();
-    let prepared = prepare(model, measurements.runs, &FitSettings::default(), &silent)?;
+    let read = Read::of(model, measurements);
+    let prepared = prepare(model, read.runs(), &FitSettings::default(), &silent)?;
     let (model, runs) = (&*prepared.model, &*prepared.runs);
-    let test = (measurements.test).map(|test| attach_same_observer(model, test, runs, work));
+    let test = (read.test()).map(|test| attach_same_observer(model, test, runs, work));
     let test = test.transpose()?;
     let criteria = work.criteria();
     let holdout = Holdout::new(model, runs, test.as_deref(), &criteria.holdout);
@@ -153,28 +157,62 @@ fn steps(
         work: &silent,
     };
     diagnosis.where_it_fails = where_it_fails(&plain.model, &plain.solution, runs, work)?;
-    let mut finalists = match aim.discover {
+    let finalists = match aim.discover {
         Discover::Only => Vec::new(),
         Discover::Never | Discover::Last => search(diagnosis, &nominal, work)?,
     };
+    let Some(first) = read.first() else {
+        let unseen = &plain.judgement.losses;
+        return conclude_from(diagnosis, &nominal, unseen, finalists, aim, work);
+    };
+    // Everything that was measured has the last word.
+    let all = attach_same_observer(model, measurements.runs, runs, work)?;
+    let test = (measurements.test).map(|test| attach_same_observer(model, test, runs, work));
+    let test = test.transpose()?;
+    let holdout = Holdout::new(model, &all, test.as_deref(), &criteria.holdout);
+    diagnosis.floor.nrmse = floor(model, test.as_deref().unwrap_or(&all), &criteria.log);
+    let plain = plain_on_all(diagnosis, &nominal, &holdout, &first)?;
+    let nominal = Nominal {
+        model: &plain.model,
+        solution: &plain.solution,
+        rank: &plain.judgement.rank,
+        holdout: &holdout,
+        ..nominal
+    };
+    diagnosis.where_it_fails = where_it_fails(&plain.model, &plain.solution, &all, work)?;
+    let finalists = finalists_on_all(diagnosis, &nominal, finalists, &first, work)?;
+    let unseen = &plain.judgement.losses;
+    conclude_from(diagnosis, &nominal, unseen, finalists, aim, work)
+}
+
+/// What follows from the finalists and the plain model.
+fn conclude_from(
+    diagnosis: &mut Diagnosis,
+    nominal: &Nominal<'_>,
+    unseen: &Losses,
+    mut finalists: Vec<Judged>,
+    aim: Aim,
+    work: &Work<'_>,
+) -> Result<(), FitError> {
+    let runs = nominal.holdout.runs;
     let mut explanations = diagnosis.candidates.clone();
     let evidence = Evidence {
-        nominal: &nominal,
-        unseen: &plain.judgement.losses,
+        nominal,
+        unseen,
         nominal_fit: diagnosis.nominal_fit,
         floor: diagnosis.floor.nrmse,
-        floor_fit: floor(model, runs, &criteria.log),
-        predictable: predictable(&plain.model, &plain.solution, runs, work)?,
+        floor_fit: floor(nominal.given, runs, &work.criteria().log),
+        predictable: predictable(nominal.model, nominal.solution, runs, work)?,
         least: aim.least,
     };
     let mut verdict = conclude(diagnosis, &finalists, &evidence);
     if verdict == Conclusion::UnknownEffect {
         work.tell(Stage::ResidualForce, 0, 1);
-        let force = residual_force::of_solution(&plain.model, &plain.solution, runs, work)?;
+        let force = residual_force::of_solution(nominal.model, nominal.solution, runs, work)?;
         let expression = force.as_ref().and_then(|f| f.expression.as_ref());
         if let Some((judged, explanation)) = expression
             .filter(|_| aim.discover != Discover::Never)
-            .and_then(|expression| discovered(expression, &nominal))
+            .and_then(|expression| discovered(expression, nominal))
         {
             let better = |other: &Judged| other.error() > judged.error();
             let place = finalists.iter().position(better).unwrap_or(finalists.len());
@@ -186,7 +224,9 @@ fn steps(
         diagnosis.residual_force = force.filter(|_| verdict == Conclusion::UnknownEffect);
         work.go_on()?;
     }
-    diagnosis.advice.extend(sufficiency::notes(model, runs));
+    diagnosis
+        .advice
+        .extend(sufficiency::notes(nominal.given, runs));
     diagnosis.verdict = verdict;
     Ok(())
 }
@@ -244,7 +284,7 @@ fn solve_plain(
     let scaled = problem.pack(&solution.values, &solution.states);
     let cost = problem.residual_vector(&scaled)?.norm_squared();
     let judgement = holdout.judge(model, &solution, work)?;
-    let fitted = holdout.fitted(model, &solution, work)?;
+    let fitted = holdout.fitted(model, &solution, &judgement.rank, work)?;
     let mut model = model.clone();
     model.set_values(&solution.values);
     let plain = Plain {

@@ -34,6 +34,7 @@ fn candidate(expression: &ForceExpression, nominal: &Nominal<'_>) -> Option<Cand
         separate: added.len() > 1,
         replaces: None,
         flow: 0.0,
+        reach: 0.0,
         by_position: false,
         widths: Vec::new(),
         entries: Some(expression.toml.clone()),

@@ -23,7 +23,12 @@ pub(crate) fn explain(
     let candidate = &judged.candidate;
     let significance = significance(nominal.rank, &judged.rank, nominal.work)?;
     let holdout = nominal.holdout;
-    let fitted = holdout.fitted(&candidate.model, &judged.solution, nominal.work)?;
+    let fitted = holdout.fitted(
+        &candidate.model,
+        &judged.solution,
+        &judged.rank,
+        nominal.work,
+    )?;
     Ok(Explanation {
         place: place(candidate),
         nrmse: nrmse(&judged.losses),

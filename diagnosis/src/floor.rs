@@ -5,6 +5,7 @@ use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
 
 use crate::criteria::LogCriteria;
+use crate::long::pieces;
 use crate::score::Tally;
 
 /// `nrmse` over all signals of a model without any fault.
@@ -19,6 +20,8 @@ use crate::score::Tally;
 /// * A sensor that is read more often than it has a new value (a bus that updates every 20 ms, a coarse scale):
 ///   the age of its value is anything between zero and its update time `h`. Differences are taken between new
 ///   values, and the age adds `(rate · h)²/12`.
+///
+/// Of a long log [pieces](crate::long) tell the noise; the deviation of the signal is that of all samples.
 pub(crate) fn floor(model: &Model, runs: &[Run], criteria: &LogCriteria) -> f64 {
     let n = model.measured.len();
     let sum: f64 = model
@@ -52,30 +55,35 @@ pub(crate) fn noise(
     let mut period = f64::NAN;
     for run in runs {
         let step = run.median_period();
-        let mut news: Vec<(f64, f64)> = Vec::new();
         for k in 0..run.len() {
-            let (time, y) = (run.time()[k], run.sample(k)[signal]);
+            let y = run.sample(k)[signal];
             tally.add(y, y);
-            let Some((before, last)) = news.last().copied() else {
-                if y.is_finite() {
+        }
+        for piece in pieces(run.len()) {
+            let mut news: Vec<(f64, f64)> = Vec::new();
+            for k in piece {
+                let (time, y) = (run.time()[k], run.sample(k)[signal]);
+                let Some((before, last)) = news.last().copied() else {
+                    if y.is_finite() {
+                        news.push((time, y));
+                    }
+                    continue;
+                };
+                if y.is_finite() && y != last {
+                    holds.push(time - before);
                     news.push((time, y));
                 }
-                continue;
-            };
-            if y.is_finite() && y != last {
-                holds.push(time - before);
-                news.push((time, y));
             }
-        }
-        let changes: Vec<f64> = news.iter().map(|(_, y)| *y).collect();
-        for (order, sizes) in differences.iter_mut().enumerate() {
-            sizes.extend(difference(&changes, order + 1).map(f64::abs));
-        }
-        for w in news.windows(2) {
-            // Over the time it took, each sample once.
-            let samples = ((w[1].0 - w[0].0) / step).round().max(1.0);
-            for _ in 0..(samples as usize).min(run.len()) {
-                rate.add((w[1].1 - w[0].1) / (w[1].0 - w[0].0), 0.0);
+            let changes: Vec<f64> = news.iter().map(|(_, y)| *y).collect();
+            for (order, sizes) in differences.iter_mut().enumerate() {
+                sizes.extend(difference(&changes, order + 1).map(f64::abs));
+            }
+            for w in news.windows(2) {
+                // Over the time it took, each sample once.
+                let samples = ((w[1].0 - w[0].0) / step).round().max(1.0);
+                for _ in 0..(samples as usize).min(run.len()) {
+                    rate.add((w[1].1 - w[0].1) / (w[1].0 - w[0].0), 0.0);
+                }
             }
         }
         period = period.min(step);
@@ -113,10 +121,12 @@ pub(crate) fn rounding(sensor: &Sensor, signal: usize, runs: &[Run]) -> f64 {
     let mut tally = Tally::default();
     let mut changes = Vec::new();
     for run in runs {
-        let values = (0..run.len()).map(|k| run.sample(k)[signal]);
-        let values: Vec<f64> = values.filter(|y| y.is_finite()).collect();
-        values.iter().for_each(|y| tally.add(*y, *y));
-        changes.extend(difference(&values, 1).map(f64::abs));
+        for piece in pieces(run.len()) {
+            let values = piece.map(|k| run.sample(k)[signal]);
+            let values: Vec<f64> = values.filter(|y| y.is_finite()).collect();
+            values.iter().for_each(|y| tally.add(*y, *y));
+            changes.extend(difference(&values, 1).map(f64::abs));
+        }
     }
     rounded(&changes, tally.rms())
 }

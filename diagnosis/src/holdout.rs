@@ -2,10 +2,12 @@
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
+use loopsight_model::simulate::{Simulator, try_follow};
 
 use crate::criteria::HoldoutCriteria;
 use crate::judge::Losses;
-use crate::prediction::{InitialStates, Solution, predict};
+use crate::long::ENOUGH;
+use crate::prediction::{InitialStates, Solution};
 use crate::progress::{Cancelled, Work};
 use crate::score::Tally;
 
@@ -16,6 +18,8 @@ pub(crate) struct Holdout<'a> {
     pub(crate) test: Option<&'a [Run]>,
     /// By run and sample of `runs`: whether a fit sees it; all where there is a test recording.
     pub(crate) seen: Option<Vec<Vec<bool>>>,
+    /// Samples of a run whose mean is one loss: more than one where the recordings are [long](crate::long).
+    group: usize,
     /// Standard deviations of the signals in the validation data, and in the fitting data.
     std_test: Vec<f64>,
     std_fit: Vec<f64>,
@@ -34,6 +38,9 @@ impl<'a> Holdout<'a> {
         criteria: &HoldoutCriteria,
     ) -> Self {
         let every = criteria.every.max(2);
+        let samples = |runs: &[Run]| runs.iter().map(Run::len).sum::<usize>();
+        let most = samples(runs).max(test.map_or(0, samples));
+        let group = most.div_ceil(ENOUGH).max(1);
         let seen = test.is_none().then(|| {
             runs.iter()
                 .enumerate()
@@ -41,10 +48,10 @@ impl<'a> Holdout<'a> {
                     let block = (run.duration() / criteria.blocks as f64)
                         .max(criteria.shortest_s)
                         .min(criteria.longest_s);
-                    run.time()
-                        .iter()
-                        .map(|t| {
-                            t < &block
+                    (0..run.len())
+                        .map(|k| {
+                            let t = run.time()[k - k % group];
+                            t < block
                                 || !((t / block) as usize)
                                     .wrapping_add(index)
                                     .is_multiple_of(every)
@@ -60,6 +67,7 @@ impl<'a> Holdout<'a> {
             runs,
             test,
             seen,
+            group,
         }
     }
 
@@ -71,7 +79,7 @@ impl<'a> Holdout<'a> {
         work: &Work<'_>,
     ) -> Result<Judgement, Cancelled> {
         let Some(test) = self.test else {
-            let rank = losses(model, solution, self.runs, &self.std_test, work)?;
+            let rank = self.losses(model, solution, self.runs, &self.std_test, work)?;
             return Ok(Judgement {
                 losses: self.part(&rank, false),
                 rank,
@@ -80,20 +88,34 @@ impl<'a> Holdout<'a> {
         let values = solution.values.clone();
         let states = InitialStates::estimate(model, &values, test, work)?.states;
         let on_test = Solution { values, states };
-        let losses = losses(model, &on_test, test, &self.std_test, work)?;
+        let losses = self.losses(model, &on_test, test, &self.std_test, work)?;
         let mut rank = losses.clone();
-        rank.extend(self.fitted(model, solution, work)?);
+        rank.extend(self.fitted_beside_test(model, solution, work)?);
         Ok(Judgement { losses, rank })
     }
 
-    /// Losses on the fitting data.
+    /// Losses on the fitting data of a solution that was judged, and has these losses to be `rank`ed by.
     pub(crate) fn fitted(
+        &self,
+        model: &Model,
+        solution: &Solution,
+        rank: &Losses,
+        work: &Work<'_>,
+    ) -> Result<Losses, Cancelled> {
+        if self.test.is_none() {
+            return Ok(self.part(rank, true));
+        }
+        self.fitted_beside_test(model, solution, work)
+    }
+
+    /// The same where a test recording judges, in one more pass over the data.
+    fn fitted_beside_test(
         &self,
         model: &Model,
         solution: &Solution,
         work: &Work<'_>,
     ) -> Result<Losses, Cancelled> {
-        let all = losses(model, solution, self.runs, &self.std_fit, work)?;
+        let all = self.losses(model, solution, self.runs, &self.std_fit, work)?;
         Ok(self.part(&all, true))
     }
 
@@ -102,11 +124,46 @@ impl<'a> Holdout<'a> {
         let Some(mask) = &self.seen else {
             return all.clone();
         };
-        let samples = all.iter().zip(mask.iter().flatten());
+        let mask = mask.iter().flat_map(|run| run.iter().step_by(self.group));
+        let samples = all.iter().zip(mask);
         samples
             .filter(|(_, s)| **s == seen)
             .map(|(loss, _)| *loss)
             .collect()
+    }
+
+    /// Losses on all samples of `runs`.
+    fn losses(
+        &self,
+        model: &Model,
+        solution: &Solution,
+        runs: &[Run],
+        std: &[f64],
+        work: &Work<'_>,
+    ) -> Result<Losses, Cancelled> {
+        let n = std.len();
+        let mut all = Losses::new();
+        for (run, x0) in runs.iter().zip(&solution.states) {
+            let mut simulator = Simulator::new(model, &solution.values);
+            let (mut sum, mut count) = (0.0, 0usize);
+            try_follow(&mut simulator, x0.as_slice(), run, |k, predicted, _| {
+                let loss: f64 = (0..n)
+                    .map(|i| {
+                        let e = (run.sample(k)[i] - predicted[i]) / std[i];
+                        // A missing sample, or a signal that never moves, counts nothing.
+                        if e.is_nan() { 0.0 } else { e * e }
+                    })
+                    .sum();
+                sum += loss / n as f64;
+                count += 1;
+                if count == self.group || k + 1 == run.len() {
+                    all.push(sum / count as f64);
+                    (sum, count) = (0.0, 0);
+                }
+                work.go_on()
+            })?;
+        }
+        Ok(all)
     }
 }
 
@@ -132,30 +189,4 @@ fn deviations(runs: &[Run], n: usize) -> Vec<f64> {
             tally.std()
         })
         .collect()
-}
-
-/// Losses on all samples of `runs`.
-fn losses(
-    model: &Model,
-    solution: &Solution,
-    runs: &[Run],
-    std: &[f64],
-    work: &Work<'_>,
-) -> Result<Losses, Cancelled> {
-    let n = std.len();
-    let mut all = Losses::new();
-    for (run, x0) in runs.iter().zip(&solution.states) {
-        let predicted = predict(model, &solution.values, x0.as_slice(), run, work)?;
-        for k in 0..run.len() {
-            let loss: f64 = (0..n)
-                .map(|i| {
-                    let e = (run.sample(k)[i] - predicted[k * n + i]) / std[i];
-                    // A missing sample, or a signal that never moves, counts nothing.
-                    if e.is_nan() { 0.0 } else { e * e }
-                })
-                .sum();
-            all.push(loss / n as f64);
-        }
-    }
-    Ok(all)
 }

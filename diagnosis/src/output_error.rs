@@ -1,18 +1,13 @@
 //! Least squares on the error of the free run.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::arrive::{Arrived, Convergence};
-use crate::compare::Comparison;
-use crate::derived::{Known, derived};
 use crate::error::FitError;
-use crate::estimate::{Estimate, ParameterVerdict};
 use crate::fitted::Fit;
 use crate::flatness::Flatness;
 use crate::noise;
@@ -231,24 +226,11 @@ impl Problem<'_> {
 
     /// The fit that a solution gives: estimates, intervals, errors.
     pub(crate) fn result(&self, solution: &DVector<f64>) -> Result<Fit, Cancelled> {
-        let (mut values, _) = self.unpack(solution);
-        for i in &self.free {
-            // The solver stays strictly inside the range. A value next to the end means the end.
-            let declaration = self.model.parameters[*i].declaration;
-            for end in [declaration.bounds().0, declaration.bounds().1] {
-                if (values[*i] - end).abs() < 1e-9 * self.model.parameters[*i].scale() {
-                    values[*i] = end;
-                }
-            }
-        }
         let (residual, mut jacobian) = self.linearise(solution)?;
         let criteria = &self.work.criteria().parameters;
         limit_rows(&mut jacobian, criteria.steep);
         let gram = jacobian.tr_mul(&jacobian);
         let norms: Vec<f64> = (0..gram.ncols()).map(|i| gram[(i, i)].sqrt()).collect();
-        let quantile = StudentsT::new(0.0, 1.0, (self.samples - norms.len() as f64).max(1.0))
-            .map_or(1.96, |t| t.inverse_cdf(criteria.quantile));
-
         let flatness = Flatness::of(&gram, &norms, &self.named(), criteria);
         let blocks = self.blocks(&residual, &jacobian);
         let inverse = flatness.inverse(&norms);
@@ -258,96 +240,6 @@ impl Problem<'_> {
         if let Some(shift) = self.shift(solution, &residual, &jacobian, &inverse)? {
             shift.widen(&mut covariance);
         }
-
-        let mut fitted = self.model.clone();
-        fitted.set_values(&values);
-        let mut parameters = BTreeMap::new();
-        for (index, parameter) in fitted.parameters.iter().enumerate() {
-            let Some(value) = parameter.value else {
-                continue;
-            };
-            let mut estimate = Estimate {
-                value,
-                unit: parameter.unit.clone(),
-                std_error: None,
-                interval95: None,
-                verdict: ParameterVerdict::Frozen,
-            };
-            let gradient = fitted.tie_gradient(index);
-            if !gradient.is_empty() {
-                estimate.verdict = ParameterVerdict::Tied;
-                let by = |i: usize| self.free.iter().position(|f| *f == i);
-                let steps: Vec<(usize, f64)> = gradient
-                    .into_iter()
-                    .filter_map(|(i, slope)| by(i).map(|k| (k, slope * self.scales[k])))
-                    .collect();
-                let known = |k: usize| !flatness.dead[k] && !flatness.flat[k];
-                let variance: f64 = steps
-                    .iter()
-                    .flat_map(|a| steps.iter().map(move |b| (a, b)))
-                    .map(|((i, a), (j, b))| a * b * covariance[(*i, *j)])
-                    .sum();
-                if steps.iter().all(|(k, _)| known(*k)) && variance.is_finite() && !steps.is_empty()
-                {
-                    let error = variance.max(0.0).sqrt();
-                    estimate.std_error = Some(error);
-                    estimate.interval95 =
-                        Some([value - quantile * error, value + quantile * error]);
-                }
-            }
-            if let Some(k) = self.free.iter().position(|i| *i == index) {
-                let error = covariance[(k, k)].max(0.0).sqrt() * self.scales[k];
-                let known = error.is_finite() && !flatness.dead[k] && !flatness.flat[k];
-                let (low, high) = parameter.declaration.bounds();
-                if known {
-                    estimate.std_error = Some(error);
-                    // The interval ends where the admissible range ends.
-                    estimate.interval95 = Some([
-                        (value - quantile * error).max(low),
-                        (value + quantile * error).min(high),
-                    ]);
-                }
-                let margin = criteria.at_bound * parameter.scale();
-                estimate.verdict = if flatness.dead[k] {
-                    ParameterVerdict::Dead
-                } else if flatness.flat[k] {
-                    ParameterVerdict::Flat
-                } else if value - low < margin || high - value < margin {
-                    ParameterVerdict::AtBound
-                } else if quantile * error > criteria.not_pinned * value.abs() {
-                    ParameterVerdict::NotPinned
-                } else {
-                    ParameterVerdict::Good
-                };
-            }
-            parameters.insert(parameter.name.clone(), estimate);
-        }
-        let n = self.free.len();
-        let known = Known {
-            free: &self.free,
-            covariance: DMatrix::from_fn(n, n, |i, j| {
-                covariance[(i, j)] * self.scales[i] * self.scales[j]
-            }),
-            undetermined: (0..n)
-                .map(|k| flatness.dead[k] || flatness.flat[k])
-                .collect(),
-            quantile,
-            not_pinned: criteria.not_pinned,
-        };
-        let error = self.best().map_or(f64::NAN, |(error, _)| error);
-        Ok(Fit {
-            comparison: Comparison::of_error(error),
-            parameters,
-            derived: derived(&fitted, Some(&known)),
-            method: Method::OutputError,
-            nrmse_before: None,
-            nrmse_fit: error,
-            iterations: self.evaluations.get(),
-            convergence: None,
-            flat: flatness.words,
-            cancelled: false,
-            model: fitted,
-            history: Vec::new(),
-        })
+        Ok(self.fit_of(&self.values_at(solution), &covariance, flatness))
     }
 }

@@ -1,5 +1,7 @@
 //! Simulated outputs with exact derivatives, initial states, and the one-step prediction.
 
+use std::borrow::Cow;
+
 use loopsight_core::Real;
 use loopsight_model::model::{Model, pseudo_inverse};
 use loopsight_model::run::Run;
@@ -7,6 +9,7 @@ use loopsight_model::simulate::{Simulator, try_follow};
 use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::{DMatrix, DVector};
 
+use crate::long::ENOUGH;
 use crate::positions::{Positions, run_with};
 use crate::progress::{Cancelled, Work};
 
@@ -193,7 +196,8 @@ impl InitialStates {
 
     /// Those that make the free-run error least, by Gauss–Newton from [`InitialStates::guess`].
     ///
-    /// Only the beginning of a run tells anything about its initial state. Where the plant is linear, two steps
+    /// Only the beginning of a run tells anything about its initial state, and of a long one only that is looked at.
+    /// (Where errors of the state last, an observer forgets them.) Where the plant is linear, two steps
     /// are exact to rounding. A step is taken only if it lowers the error.
     pub(crate) fn estimate(
         model: &Model,
@@ -207,6 +211,11 @@ impl InitialStates {
             if run.len() < 2 {
                 continue;
             }
+            let beginning = match run.len() {
+                0..=ENOUGH => Cow::Borrowed(run),
+                _ => Cow::Owned(run.part(0..ENOUGH)),
+            };
+            let run = &*beginning;
             let cost = |x: &DVector<f64>| {
                 predict(model, values, x.as_slice(), run, work).map(|p| squares(&p, run))
             };

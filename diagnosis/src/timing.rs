@@ -7,6 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::criteria::ParameterCriteria;
 use crate::noise;
 use crate::prediction::predict_with;
 use crate::problem::Problem;
@@ -24,7 +25,43 @@ pub(crate) struct Shift {
     size: f64,
 }
 
+/// The size of a shift that was found with a standard error, where a clock is `known` to so much. None where it is
+/// chance.
+fn allowed(found: f64, error: f64, known: f64) -> Option<f64> {
+    let tells = error < known;
+    if tells && found.abs() <= EARNED * error {
+        return None;
+    }
+    Some(if tells { found.abs() } else { known })
+}
+
 impl Shift {
+    /// That of a fit by its sums alone: those of the unknowns, and as the last row and column those of `d`.
+    ///
+    /// `meat` is the covariance of `(J, d)ᵀ r`. For the rest see [`Problem::shift`].
+    pub(crate) fn of_sums(
+        gram: &DMatrix<f64>,
+        right: &DVector<f64>,
+        meat: &DMatrix<f64>,
+        inverse: &DMatrix<f64>,
+        criteria: &ParameterCriteria,
+    ) -> Option<Self> {
+        let n = inverse.ncols();
+        let along = -(inverse * gram.view((0, n), (n, 1)).column(0));
+        let beside = along.clone().push(1.0);
+        let (whole, left) = (gram[(n, n)], (gram * &beside).dot(&beside));
+        if !(whole > 0.0 && whole.is_finite() && along.iter().all(|v| v.is_finite())) {
+            return None;
+        }
+        let size = if left > criteria.flat * whole {
+            let error = (meat * &beside).dot(&beside).max(0.0).sqrt() / left;
+            allowed(right.dot(&beside) / left, error, criteria.clock)?
+        } else {
+            criteria.clock
+        };
+        Some(Self { along, size })
+    }
+
     /// Adds what it leaves open to the covariance of the unknowns.
     pub(crate) fn widen(&self, covariance: &mut DMatrix<f64>) {
         *covariance += &self.along * self.along.transpose() * self.size.powi(2);
@@ -61,7 +98,6 @@ impl Problem<'_> {
         if !(whole > 0.0 && whole.is_finite() && along.iter().all(|v| v.is_finite())) {
             return Ok(None);
         }
-        let known = criteria.clock;
         // Rounding errors are all that is left of a direction within those of the parameters.
         let size = if left > criteria.flat * whole {
             let found = beside.dot(residual) / left;
@@ -70,16 +106,11 @@ impl Problem<'_> {
             let blocks = self.blocks(residual, &column);
             let n_signals = self.model.measured.len();
             let variance = noise::covariance(&blocks, n_signals, &inverse, 1, &self.work)?[(0, 0)];
-            let error = variance.max(0.0).sqrt();
-            let tells = error < known;
-            if tells && found.abs() <= EARNED * error {
-                return Ok(None);
-            }
-            if tells { found.abs() } else { known }
+            allowed(found, variance.max(0.0).sqrt(), criteria.clock)
         } else {
-            known
+            Some(criteria.clock)
         };
-        Ok(Some(Shift { along, size }))
+        Ok(size.map(|size| Shift { along, size }))
     }
 
     /// The change of the residuals with a shift of one period.

@@ -47,7 +47,7 @@ impl Judged {
     }
 
     /// Judges the solution of a candidate's `model`; none where its free run diverges or the work was cancelled.
-    fn of(
+    pub(crate) fn of(
         candidate: Candidate,
         model: &Model,
         solution: Solution,

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::criteria::FailsCriteria;
 use crate::floor::rounding;
+use crate::long::Thinned;
 use crate::motion::{Motion, changes, rest, speed};
 use crate::prediction::Solution;
 use crate::progress::{Cancelled, Work};
@@ -142,7 +143,7 @@ fn extent(values: &[f64]) -> (f64, f64) {
         })
 }
 
-/// The samples of each measured signal.
+/// The samples of each measured signal; of a long log those that stand for it.
 fn collect(
     model: &Model,
     solution: &Solution,
@@ -150,6 +151,7 @@ fn collect(
     work: &Work<'_>,
 ) -> Result<Vec<Samples>, Cancelled> {
     let criteria = &work.criteria().fails;
+    let thinned = Thinned::of(runs.iter().map(Run::len).sum());
     let n = model.measured.len();
     let mut all: Vec<Samples> = (0..n)
         .map(|_| Samples {
@@ -180,6 +182,10 @@ fn collect(
             .collect();
         let mut simulator = Simulator::new(model, &solution.values);
         try_follow(&mut simulator, x0.as_slice(), run, |k, predicted, now| {
+            work.go_on()?;
+            if !thinned.takes(k) {
+                return Ok(());
+            }
             for (i, samples) in all.iter_mut().enumerate() {
                 let error = run.sample(k)[i] - predicted[i];
                 if !error.is_finite() {
@@ -199,7 +205,7 @@ fn collect(
                     list.push(*value);
                 }
             }
-            work.go_on()
+            Ok(())
         })?;
     }
     Ok(all)

@@ -89,8 +89,11 @@ pub(crate) fn parse_csv(text: &str, log: &str) -> Result<Table, RecordingError> 
         .first()
         .ok_or_else(|| RecordingError::HeaderOnly { log: log.into() })?;
     let width = columns.len().max(1);
-    let rows: Vec<&[f64]> = run.rows.chunks_exact(width).collect();
-    let rising = !named && width > 1 && rows.windows(2).all(|w| w[0][0] < w[1][0]);
+    let first = || run.rows.iter().step_by(width);
+    let rising = !named && width > 1 && first().zip(first().skip(1)).all(|(a, b)| a < b);
+    if run.lines.windows(2).all(|w| w[1] == w[0] + 1) {
+        run.lines = Vec::new();
+    }
     Ok(Table {
         source: log.into(),
         columns,
