@@ -34,9 +34,16 @@ pub fn said(improvement: &Improvement) -> Said {
         }
         return said;
     };
+    let own = |effect: &EffectAt| {
+        let mut steps = improvement.steps.iter().filter(|s| s.entries.is_some());
+        let is_own = steps.any(|s| s.added.as_ref().is_some_and(|a| a.effect == effect.effect));
+        if is_own { "an effect of its own, " } else { "" }
+    };
     let names: Vec<String> = match added.as_slice() {
-        [one] => vec![place(one)],
-        several => several.iter().map(place_in_brackets).collect(),
+        [one] => vec![format!("{}{}", own(one), place(one))],
+        several => (several.iter())
+            .map(|one| format!("{}{}", own(one), place_in_brackets(one)))
+            .collect(),
     };
     let mut because = vec![format!(
         "With {} the free-run error falls from {} to {}, on data that the model was not fitted to.",
