@@ -92,8 +92,17 @@ impl Candidate {
     }
 
     /// Whether, at these `values`, one of its speeds is no larger than the smoothing width of its sign.
-    /// Such an effect only sharpens the sign.
+    /// Such an effect only sharpens the sign. Nor is one an effect of its own that gives way within the same share of the
+    /// way: it is dry friction.
     pub(crate) fn drowns(&self, values: &[f64], criteria: &SearchCriteria) -> bool {
+        let shortest = criteria.sign_width * self.reach;
+        let at_once = self.own().any(|i| {
+            let per_way = self.model.parameters[i].declaration.unit == "1/position";
+            per_way && values.get(i).is_some_and(|rate| rate * shortest > 1.0)
+        });
+        if at_once {
+            return true;
+        }
         let speeds = |width: bool| {
             self.own().filter_map(move |i| {
                 let declaration = &self.model.parameters[i].declaration;
