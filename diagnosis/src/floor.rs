@@ -14,12 +14,15 @@ use crate::score::Tally;
 ///   ([`loopsight_model::sensor::Encoder::noise`]).
 /// * Other sensors: differences of order `n` of the measurement. In them a smooth motion vanishes, and white
 ///   noise of variance `σ²` has the variance `σ² (2n)!/(n!)²`. A median leaves out jumps of the motion. Of the
-///   orders 1 to 4 the least result counts: motion adds to low orders, and noise that alternates (differences
-///   of counts) adds to high ones. The noise is never below the rounding of the log, its least change over
-///   `√12`.
-/// * A sensor that is read more often than it has a new value (a bus that updates every 20 ms, a coarse scale):
-///   the age of its value is anything between zero and its update time `h`. Differences are taken between new
-///   values, and the age adds `(rate · h)²/12`.
+///   orders 1 to 4 the least result counts, because motion adds to low orders. Differences are taken between
+///   neighbours and between every other sample: neighbours of noise that alternates (differences of counts)
+///   differ by more than white noise of the same size would, every other sample does not. The noise is never below
+///   the rounding of the log, its least change `q` over `√12`.
+/// * A coarse log, which changes by one step of `q` or two at a time, has its noise in few values. Then the median
+///   is that of grouped data: values are spread evenly over their step, and what that adds, `q²/12`, is taken off.
+/// * A sensor that is read more often than it has a new value (a bus that updates every 20 ms): the age of its
+///   value is anything between zero and its update time `h`. Differences are taken between new values, and the age
+///   adds `(rate · h)²/12`. A coarse log that repeats a value was read all the same.
 ///
 /// Of a long log [pieces](crate::long) tell the noise; the deviation of the signal is that of all samples.
 pub(crate) fn floor(model: &Model, runs: &[Run], criteria: &LogCriteria) -> f64 {
@@ -49,7 +52,8 @@ pub(crate) fn noise(
     criteria: &LogCriteria,
 ) -> (f64, f64) {
     let mut tally = Tally::default();
-    let mut differences = [const { Vec::new() }; ORDERS];
+    let mut every: Vec<Vec<f64>> = Vec::new();
+    let mut changing: Vec<Vec<f64>> = Vec::new();
     let mut holds = Vec::new();
     let mut rate = Tally::default();
     let mut period = f64::NAN;
@@ -60,6 +64,8 @@ pub(crate) fn noise(
             tally.add(y, y);
         }
         for piece in pieces(run.len()) {
+            let values = piece.clone().map(|k| run.sample(k)[signal]);
+            every.push(values.filter(|y| y.is_finite()).collect());
             let mut news: Vec<(f64, f64)> = Vec::new();
             for k in piece {
                 let (time, y) = (run.time()[k], run.sample(k)[signal]);
@@ -74,10 +80,7 @@ pub(crate) fn noise(
                     news.push((time, y));
                 }
             }
-            let changes: Vec<f64> = news.iter().map(|(_, y)| *y).collect();
-            for (order, sizes) in differences.iter_mut().enumerate() {
-                sizes.extend(difference(&changes, order + 1).map(f64::abs));
-            }
+            changing.push(news.iter().map(|(_, y)| *y).collect());
             for w in news.windows(2) {
                 // Over the time it took, each sample once.
                 let samples = ((w[1].0 - w[0].0) / step).round().max(1.0);
@@ -91,21 +94,20 @@ pub(crate) fn noise(
     let noise = match sensor {
         Sensor::EncoderCounts(encoder) => encoder.noise(period),
         Sensor::Instantaneous | Sensor::IntervalMean => {
-            let rounding = rounded(&differences[0], tally.rms());
-            let orders = differences.into_iter().zip(1..);
-            let white = orders
-                .filter(|(sizes, _)| !sizes.is_empty())
-                .map(|(sizes, order)| median(sizes) / 0.6745 / gain(order).sqrt())
-                .fold(f64::INFINITY, f64::min);
-            let white = if white.is_finite() { white } else { 0.0 };
-            let white = white.max(rounding);
-            let hold = median(holds);
-            let age = if hold > criteria.repeats_periods * period {
-                rate.rms() * hold / 12f64.sqrt()
+            let steps = sizes(&changing, 1, 1);
+            let step = least(&steps, tally.rms());
+            let rounding = step / 12f64.sqrt();
+            if median(steps) <= COARSE * step {
+                white(&every, step).max(rounding)
             } else {
-                0.0
-            };
-            white.hypot(age)
+                let hold = median(holds);
+                let age = if hold > criteria.repeats_periods * period {
+                    rate.rms() * hold / 12f64.sqrt()
+                } else {
+                    0.0
+                };
+                white(&changing, 0.0).max(rounding).hypot(age)
+            }
         }
     };
     (noise, tally.std())
@@ -119,32 +121,53 @@ pub(crate) fn rounding(sensor: &Sensor, signal: usize, runs: &[Run]) -> f64 {
         return encoder.noise(periods.fold(f64::INFINITY, f64::min));
     }
     let mut tally = Tally::default();
-    let mut changes = Vec::new();
+    let mut all: Vec<Vec<f64>> = Vec::new();
     for run in runs {
         for piece in pieces(run.len()) {
             let values = piece.map(|k| run.sample(k)[signal]);
             let values: Vec<f64> = values.filter(|y| y.is_finite()).collect();
             values.iter().for_each(|y| tally.add(*y, *y));
-            changes.extend(difference(&values, 1).map(f64::abs));
+            all.push(values);
         }
     }
-    rounded(&changes, tally.rms())
+    least(&sizes(&all, 1, 1), tally.rms()) / 12f64.sqrt()
 }
 
 /// Orders of the differences.
 const ORDERS: usize = 4;
+/// Samples between the values of a difference.
+const SPACINGS: usize = 2;
+/// A log whose changes are mostly of this many steps or fewer is coarse: with more, the steps of a normal
+/// distribution's median are a small part of it.
+const COARSE: f64 = 2.0;
 
-/// Differences of an order.
-fn difference(values: &[f64], order: usize) -> impl Iterator<Item = f64> + '_ {
-    values.windows(order + 1).map(move |w| {
-        let mut factor = 1.0;
-        let mut sum = 0.0;
-        for (k, value) in w.iter().rev().enumerate() {
-            sum += factor * value;
-            factor *= -((order - k) as f64) / (k + 1) as f64;
+/// Standard deviation of white noise in runs that change by multiples of `step`, or of 0 where that does not show.
+fn white(runs: &[Vec<f64>], step: f64) -> f64 {
+    let least = (1..=ORDERS)
+        .flat_map(|order| (1..=SPACINGS).map(move |spacing| (order, spacing)))
+        .filter_map(|(order, spacing)| {
+            let sizes = sizes(runs, order, spacing);
+            let spread = (!sizes.is_empty()).then(|| grouped_median(sizes, step) / 0.6745)?;
+            let grouped = step * step / 12.0;
+            Some(((spread * spread - grouped).max(0.0) / gain(order)).sqrt())
+        })
+        .fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
+}
+
+/// Sizes of the differences of an order, of values that are `spacing` samples apart.
+fn sizes(runs: &[Vec<f64>], order: usize, spacing: usize) -> Vec<f64> {
+    let of_run = |values: &Vec<f64>| {
+        let mut left = values.clone();
+        for _ in 0..order {
+            left = (left.iter().zip(left.iter().skip(spacing)))
+                .map(|(before, after)| after - before)
+                .collect();
         }
-        sum
-    })
+        left
+    };
+    let all = runs.iter().flat_map(of_run);
+    all.map(f64::abs).collect()
 }
 
 /// Variance of the differences of an order of white noise of variance 1: `(2n)!/(n!)²`.
@@ -152,17 +175,28 @@ fn gain(order: usize) -> f64 {
     (1..=order).fold(1.0, |all, k| all * (order + k) as f64 / k as f64)
 }
 
-/// Standard deviation of rounding to the least that a signal of this root mean square changes by.
-fn rounded(changes: &[f64], rms: f64) -> f64 {
+/// The least of the changes of a signal of this root mean square, or 0 where there is none.
+fn least(changes: &[f64], rms: f64) -> f64 {
     let least = changes
         .iter()
         .copied()
         .filter(|change| *change > 1e-9 * rms)
         .fold(f64::INFINITY, f64::min);
-    if least.is_finite() {
-        least / 12f64.sqrt()
+    if least.is_finite() { least } else { 0.0 }
+}
+
+/// The median of sizes that were rounded to multiples of `step`, each as likely anywhere within its step.
+fn grouped_median(sizes: Vec<f64>, step: f64) -> f64 {
+    let half = 0.5 * sizes.len() as f64;
+    let count = |below: f64| sizes.iter().filter(|size| **size < below).count() as f64;
+    let middle = median(sizes.clone());
+    let (low, high) = (middle - 0.5 * step, middle + 0.5 * step);
+    let (below, within) = (count(low), count(high) - count(low));
+    let low = low.max(0.0);
+    if within > 0.0 {
+        low + (high - low) * (half - below) / within
     } else {
-        0.0
+        middle
     }
 }
 
@@ -203,12 +237,34 @@ mod tests {
         let motion = |k: usize| 20.0 * (0.04 * k as f64).sin();
         let plain = of((0..4000).map(|k| motion(k) + q[k]).collect());
         assert!((plain - 1.0).abs() < 0.1, "{plain}");
-        // Differences of counts have the variance 2, and their first differences 6, as if it were 3; the
-        // third differences have 70, as if it were 3.5.
+        // Differences of counts have the variance 2. Neighbours differ by as much as if it were 3, the third
+        // differences as if it were 3.5.
         let alternating = of((0..4000).map(|k| motion(k) + q[k + 1] - q[k]).collect());
         assert!(
-            (alternating / 3f64.sqrt() - 1.0).abs() < 0.05,
+            (alternating / 2f64.sqrt() - 1.0).abs() < 0.1,
             "{alternating}"
+        );
+        // Rounded to steps as large as the noise, or three times as large.
+        for step in [1.0, 3.0] {
+            let noise = 1f64.hypot(step / 12f64.sqrt());
+            let coarse = of((0..4000)
+                .map(|k| ((motion(k) + q[k]) / step).round() * step)
+                .collect());
+            assert!((coarse / noise - 1.0).abs() < 0.15, "{coarse} {noise}");
+        }
+        // Speed from the counts of an encoder: each is off by up to one, every other way.
+        let mut angle = 0.3;
+        let counts: Vec<f64> = (0..4001)
+            .map(|k| {
+                angle += 30.0 + motion(k) + 0.1 * q[k];
+                angle.floor()
+            })
+            .collect();
+        let counted = of(counts.windows(2).map(|w| w[1] - w[0]).collect());
+        let true_noise = (1.0f64 / 6.0 + 0.01).sqrt();
+        assert!(
+            (counted / true_noise - 1.0).abs() < 0.25,
+            "{counted} {true_noise}"
         );
         // A log that is rounded has noise, however seldom it changes.
         let rounded = of((0..4000)
