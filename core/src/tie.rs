@@ -16,6 +16,9 @@ pub struct Unshown {
     pub shown_by: &'static [(&'static str, f64)],
     /// What its parameters are where it does not show.
     pub ties: &'static [Tie],
+    /// Efforts, by the ids of their channels, that act on this part alone. What the ties assume cannot be told from
+    /// an effect there.
+    pub channels: &'static [&'static str],
     /// Why they are likely to be so, in one sentence.
     pub because: &'static str,
 }

@@ -158,7 +158,8 @@ impl Candidate {
 ///
 /// Left out are effects that the model already has at these channels, effects on signals that are not
 /// measured, and effects that cannot show in `runs`. Where the log's inputs were measured at the machine, effects
-/// before that point are left out too. An effect that contains one of the model's at the same channels replaces it.
+/// before that point are left out too, and where a part of the plant is tied because the log does not show it,
+/// effects on that part. An effect that contains one of the model's at the same channels replaces it.
 ///
 /// `rms` are the root mean squares of the plant's signals in the recording. Smoothing widths are set from
 /// them, because machines move at very different speeds. `observed` says that an observer corrects the free
@@ -181,6 +182,7 @@ pub(crate) fn candidates(
                 .any(|e| e.meta.id == meta.id && e.at.iter().any(|c| at.contains(&c.id)));
             if present
                 || has_another_name(model, meta, &at)
+                || is_unshown(model, &at)
                 || !can_show(model, meta, &at, runs, criteria)
             {
                 continue;
@@ -348,6 +350,12 @@ fn has_another_name(model: &Model, meta: &'static EffectMeta, at: &[&str]) -> bo
         .any(|other| has(other) || preferred(model, other, channel))
 }
 
+/// Whether an effect at the channels `at` acts on a part of the plant that is tied because the log does not show it.
+fn is_unshown(model: &Model, at: &[&str]) -> bool {
+    let mut parts = model.tied_parts();
+    parts.any(|part| part.channels.iter().any(|channel| at.contains(channel)))
+}
+
 pub(crate) fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<&'static str>> {
     let fitting: Vec<&'static Channel> = model
         .plant
@@ -395,4 +403,49 @@ fn is_seen(model: &Model, meta: &EffectMeta, channel: &Channel) -> bool {
             || !meta.memory && matches!(&m.sensor, Sensor::EncoderCounts(encoder)
                 if encoder.of.keys().any(|s| model.find_signal(s) == Ok(index)))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use loopsight_plants as _;
+
+    use super::*;
+
+    const ROBOT: &str = "[plant.ddmr]\nK_B = 0.0\nK_E = 0.0\nhalf_track = 0.3\nwheel_radius = 0.07\n\
+                         [log.measured]\ntrack_speed_right = { sensor = \"instantaneous\" }\n\
+                         track_speed_left = { sensor = \"instantaneous\" }\n";
+
+    /// Channels of the candidates, where this part of the robot does not show; all where none is named.
+    fn tried(unshown: Option<&str>) -> Vec<&'static str> {
+        let (robot, _) = Model::from_toml("robot.toml", ROBOT).unwrap();
+        let mut parts = robot.unshown().iter();
+        let part = unshown.map(|what| parts.find(|part| part.what == what).unwrap());
+        let robot = part.map_or(robot.clone(), |part| robot.tied(part));
+        let mut run = Run::empty(2, 2);
+        for k in 0..100 {
+            let u = if k < 50 { 3.0 } else { -3.0 };
+            run.push(0.01 * f64::from(k), &[u, u], &[u, u]).unwrap();
+        }
+        let rms = vec![1.0; robot.n_signals()];
+        let all = candidates(&robot, &[run], &rms, false, &SearchCriteria::DEFAULT);
+        all.into_iter().flat_map(|c| c.at).collect()
+    }
+
+    #[test]
+    fn nothing_is_tried_where_the_log_shows_nothing() {
+        let all = tried(None);
+        for channel in ["wheel.right", "body.forward", "body.yaw"] {
+            assert!(all.contains(&channel), "{channel}");
+        }
+        for (part, hidden) in [
+            ("turning", "body.yaw"),
+            ("driving straight", "body.forward"),
+        ] {
+            let some = tried(Some(part));
+            assert!(some.contains(&"wheel.right"), "{part}: {some:?}");
+            // A change of the payload is one of the whole.
+            assert!(some.contains(&"inertia.forward"), "{part}: {some:?}");
+            assert!(!some.contains(&hidden), "{part}: {some:?}");
+        }
+    }
 }

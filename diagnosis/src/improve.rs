@@ -3,7 +3,7 @@
 use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::Criteria;
 use crate::diagnose::{Aim, Discover, diagnose_for};
-use crate::error::FitError;
+use crate::error::{CompareError, FitError};
 use crate::fit::fit;
 use crate::fitted::Fit;
 use crate::improvement::{Improvement, ImprovementStep};
@@ -54,7 +54,13 @@ fn improve_with(
 ) -> Result<Improvement, FitError> {
     let mut state = State::new(model, discover);
     let verdict = loop {
-        let diagnosis = state.diagnose(measurements, work)?;
+        let diagnosis = match state.diagnose(measurements, work) {
+            // A step with which the free run diverges was none.
+            Err(error) if is_divergence(&error) && state.take_back() => {
+                break Conclusion::UnknownEffect;
+            }
+            done => done?,
+        };
         let verdict = diagnosis.verdict;
         let round = state.diagnoses.len();
         let next = match (&diagnosis.missing, diagnosis.candidates.first()) {
@@ -69,6 +75,11 @@ fn improve_with(
         }
     };
     state.finish(verdict, measurements, work)
+}
+
+/// Whether work failed because the free run of the model diverges.
+fn is_divergence(error: &FitError) -> bool {
+    matches!(error, FitError::Compare(CompareError::Diverged { .. }))
 }
 
 /// An improvement in progress.
@@ -182,7 +193,12 @@ impl State {
             improve, missing, ..
         } = work.criteria();
         let floor = self.diagnoses.last().map_or(0.0, |d| d.floor.nrmse);
-        let mut present = fit(&self.present, measurements, settings, work)?;
+        let mut present = loop {
+            match fit(&self.present, measurements, settings, work) {
+                Err(error) if is_divergence(&error) && self.take_back() => {}
+                done => break done?,
+            }
+        };
         loop {
             let [.., before, last] = &self.steps[..] else {
                 return Ok(present);
@@ -209,6 +225,20 @@ impl State {
             self.steps.pop();
             present = alone;
         }
+    }
+
+    /// Takes the last step back. Whether there was one.
+    fn take_back(&mut self) -> bool {
+        let Some(mut without) = (self.steps.last()).and_then(|l| without_step(&self.present, l))
+        else {
+            return false;
+        };
+        if let Some(before) = self.before.take() {
+            take_values(&mut without, &before);
+        }
+        self.present = without;
+        self.steps.pop();
+        true
     }
 
     /// The verdict on the steps that remain: that nothing is missing was said with all of them.
@@ -264,5 +294,41 @@ impl State {
             diagnoses: self.diagnoses,
             best,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use loopsight_plants as _;
+
+    use super::*;
+    use crate::conclusion::EffectAt;
+
+    #[test]
+    fn a_step_that_leads_nowhere_is_taken_back() {
+        let of = |level: f64| {
+            let text =
+                format!("[plant.dc_axis]\nK_A = -2.0\nK_C = {level}\n[log.measured.speed]\n");
+            Model::from_toml("axis.toml", &text).unwrap().0
+        };
+        let step = |added: Option<&str>| ImprovementStep {
+            added: added.map(|effect| EffectAt {
+                effect: effect.to_owned(),
+                at: vec!["shaft".to_owned()],
+            }),
+            entries: None,
+            round: 0,
+            nrmse_fit: 0.1,
+            nrmse_test: 0.1,
+            still_open: Vec::new(),
+        };
+        let mut state = State::new(&of(8.0), Discover::Never);
+        state.steps = vec![step(None), step(Some("coulomb_friction"))];
+        let with = of(1e9).with_effect("coulomb_friction", &["shaft"]).unwrap();
+        state.before = Some(std::mem::replace(&mut state.present, with));
+        assert!(state.take_back());
+        assert_eq!((state.steps.len(), state.present.effects.len()), (1, 0));
+        assert_eq!(state.present.values(), of(8.0).values());
+        assert!(!state.take_back(), "the model as it is is no step");
     }
 }

@@ -196,7 +196,12 @@ pub(crate) fn still_open(
         return Ok(open);
     }
     let silent = work.silently();
-    let bar = refitted(model, measurements, &silent)?.0 / work.criteria().improve.better;
+    let bar = match refitted(model, measurements, &silent) {
+        Err(FitError::Cancelled(cancelled)) => return Err(cancelled.into()),
+        // Nothing can be told from a model whose free run diverges.
+        Err(_) => return Ok(open),
+        Ok((error, _)) => error / work.criteria().improve.better,
+    };
     for ((index, twin), ..) in no_worse(candidates, bar, measurements, &silent)? {
         open[index].push(twin.clone());
     }
@@ -263,7 +268,11 @@ impl Refined<'_> {
         let silent = self.work.silently();
         let now = match self.error {
             Some(now) => now,
-            None => refitted(self.model, self.measurements, &silent)?.0,
+            // Any other model is better than one whose free run diverges.
+            None => match refitted(self.model, self.measurements, &silent) {
+                Err(FitError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                found => found.map_or(f64::INFINITY, |(error, _)| error),
+            },
         };
         self.error = Some(now);
         let fitted = no_worse(candidates, share * now, self.measurements, &silent)?;

@@ -460,6 +460,7 @@ pub(super) const UNSHOWN: [Unshown; 2] = [
                 factors: &[("K_C", 1), ("half_track", -1)],
             },
         ],
+        channels: &["body.yaw"],
         because: "each side moved alone",
     },
     Unshown {
@@ -475,6 +476,7 @@ pub(super) const UNSHOWN: [Unshown; 2] = [
                 factors: &[("K_F", 1), ("half_track", 1)],
             },
         ],
+        channels: &["body.forward"],
         because: "each side moved alone",
     },
 ];
