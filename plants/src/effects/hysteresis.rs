@@ -36,8 +36,9 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 /// `stiffness/onward`.
 ///
 /// Assumptions: it does not depend on how fast the way is gone, only on the way; no fatigue. `z` is zero at the start
-/// of a run. A vehicle has no such place: what rolls on has nothing to come back to. `exponent` is not estimated unless the file frees it: logs seldom show it. An oscillator's own spring is
-/// told from `stiffness` only where the loop is open enough to be seen.
+/// of a run. A vehicle has no such place: what rolls on has nothing to come back to. `exponent` is not estimated unless the
+/// file frees it: logs seldom show it. An oscillator's own spring is told from `stiffness` only where the loop is open
+/// enough to be seen.
 ///
 /// References: R. Bouc (1967), "Forced vibration of mechanical systems with hysteresis", Proceedings of the Fourth
 /// Conference on Nonlinear Oscillation, Prague, 315; Y.-K. Wen (1976), "Method for random vibration of hysteretic
@@ -55,7 +56,7 @@ impl Effect for Hysteresis {
         remedy: "reach a position always from the same side; feed the force forward with the model's loop; a sensor behind the joint, or another material for it",
         equation: "w = -stiffness z; z' = flow (1 - onward |z|) where z flow > 0, else flow (1 + back |z|)",
         reference: "Bouc (1967), Fourth Conference on Nonlinear Oscillation, Prague, 315; Wen (1976), J. Engineering Mechanics Division 102(2), 249-263; Noël, Schoukens (2016), Workshop on Nonlinear System Identification Benchmarks, section 2",
-        example: "[[effect]]\n[effect.hysteresis]\nat = [\"mass\"]\nstiffness = 50000.0\nonward = -300.0\nback = 1900.0\n",
+        example: "[[effect]]\n[effect.hysteresis]\nat = [\"shaft\"]\nstiffness = 2.0\nonward = 4.0\nback = 1.0\n",
         places: &[PlaceKind::Effort],
         reads: &[Role::Flow, Role::Position],
         // What rolls on its way has nothing to come back to: its friction is dry.

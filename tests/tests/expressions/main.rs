@@ -127,7 +127,7 @@ fn what_is_documented_works() {
         .skip(1)
         .map(|b| b.split("```").next().unwrap())
         .collect();
-    assert_eq!(blocks.len(), 3);
+    assert_eq!(blocks.len(), 4);
     let twil = std::fs::read_to_string(repository().join("examples/twil/model.toml")).unwrap();
     let with = model(&format!("{twil}\n{}", blocks[0]));
     assert_eq!(with.effects[0].at.len(), 2);
@@ -137,6 +137,8 @@ fn what_is_documented_works() {
     let pendulum = model(blocks[2]);
     assert_eq!(pendulum.parameters.len(), 4);
     assert!(pendulum.affine().is_some());
+    let with = model(&format!("[plant.dc_axis]\n{}", blocks[3]));
+    assert_eq!(with.parameters.last().unwrap().name, "discovered.c");
 }
 
 /// Two bodies of 2 s and 200 s, read every 5 s.
