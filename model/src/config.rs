@@ -179,7 +179,7 @@ impl TomlSource {
                 .collect();
             // Lines after the first repeat the path.
             let message = error.inner().message().lines().next();
-            self.explain(path, message.unwrap_or(""))
+            self.explain(path, &without_types(message.unwrap_or("")))
         })
     }
 
@@ -332,6 +332,14 @@ pub fn nearest<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -
         .map(|(_, c)| c)
 }
 
+/// A message without the names of types: who writes a file knows tables.
+fn without_types(message: &str) -> String {
+    match message.split_once("expected struct ") {
+        Some((found, _)) => format!("{found}expected a table"),
+        None => message.to_owned(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -354,6 +362,14 @@ mod tests {
 
     #[test]
     fn a_wrong_type_is_pointed_at() {
+        #[derive(Debug, serde::Deserialize)]
+        #[allow(dead_code, reason = "only read to be refused")]
+        struct Outer {
+            thing: Thing,
+        }
+        let source = TomlSource::parse("m.toml", "thing = \"x\"\n").unwrap();
+        let message = source.read::<Outer>().unwrap_err().message;
+        assert_eq!(message, "invalid type: string \"x\", expected a table");
         let source = TomlSource::parse("m.toml", "mass = 1.0\nlist = [1.0, \"x\"]\n").unwrap();
         let error = source.read::<Thing>().unwrap_err();
         assert_eq!((error.line, error.column), (2, 14));

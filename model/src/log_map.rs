@@ -227,7 +227,7 @@ impl ColumnMap {
 
 /// A measured signal: which column, and what kind of sensor made it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table as `{ column = \"name\" }`")]
 pub struct Measured {
     /// Name in the header, or a sum or difference of names; by default found by the signal's id.
     #[serde(default, skip_serializing_if = "Option::is_none")]
