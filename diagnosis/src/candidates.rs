@@ -97,7 +97,7 @@ impl Candidate {
     pub(crate) fn drowns(&self, values: &[f64], criteria: &SearchCriteria) -> bool {
         let shortest = criteria.sign_width * self.reach;
         let at_once = self.own().any(|i| {
-            let per_way = self.model.parameters[i].declaration.unit == "1/position";
+            let per_way = is_per_way(self.model.parameters[i].declaration);
             per_way && values.get(i).is_some_and(|rate| rate * shortest > 1.0)
         });
         if at_once {
@@ -307,6 +307,11 @@ fn widths(model: &Model, rms: &[f64], sign_width: f64) -> Vec<(usize, f64)> {
 /// Whether a parameter is a speed over which a sign is smoothed.
 pub(crate) fn is_width(declaration: &Parameter) -> bool {
     declaration.unit == "flow" && !declaration.estimated
+}
+
+/// Whether a parameter is counted per way that the machine goes.
+pub(crate) fn is_per_way(declaration: &Parameter) -> bool {
+    declaration.unit == "1/position"
 }
 
 /// Sets the smoothing width of those of the last `count` effects of `model` that have one; whether any has.

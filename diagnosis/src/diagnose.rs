@@ -195,7 +195,13 @@ fn conclude_from(
     work: &Work<'_>,
 ) -> Result<(), FitError> {
     let runs = nominal.holdout.runs;
-    let mut explanations = diagnosis.candidates.clone();
+    let discovers = aim.discover != Discover::Never;
+    // In the order of the finalists, which a conclusion changes.
+    let mut explanations = if discovers {
+        diagnosis.candidates.clone()
+    } else {
+        Vec::new()
+    };
     let evidence = Evidence {
         nominal,
         unseen,
@@ -211,7 +217,7 @@ fn conclude_from(
         let force = residual_force::of_solution(nominal.model, nominal.solution, runs, work)?;
         let expression = force.as_ref().and_then(|f| f.expression.as_ref());
         if let Some((judged, explanation)) = expression
-            .filter(|_| aim.discover != Discover::Never)
+            .filter(|_| discovers)
             .and_then(|expression| discovered(expression, nominal))
         {
             let better = |other: &Judged| other.error() > judged.error();

@@ -103,6 +103,13 @@ fn window(run: &Run, start: usize, length: usize) -> Run {
     Run::new(part.name(), time, inputs, measured).unwrap_or(part)
 }
 
+/// The variance of what is finite among some values.
+fn variance(values: impl Iterator<Item = f64>) -> f64 {
+    let mut tally = Tally::default();
+    values.for_each(|value| tally.add(value, 0.0));
+    tally.std().powi(2)
+}
+
 /// Variances of inputs and measured signals over all runs.
 struct Spread {
     inputs: Vec<f64>,
@@ -113,11 +120,10 @@ impl Spread {
     fn of(runs: &[Run]) -> Self {
         let width = |of: fn(&Run) -> usize| runs.first().map_or(0, of);
         let all = |signal: usize, row: fn(&Run, usize) -> &[f64]| {
-            let mut tally = Tally::default();
-            for run in runs {
-                (0..run.len()).for_each(|k| tally.add(row(run, k)[signal], 0.0));
-            }
-            tally.std().powi(2)
+            variance(
+                runs.iter()
+                    .flat_map(|run| (0..run.len()).map(move |k| row(run, k)[signal])),
+            )
         };
         Self {
             inputs: (0..width(Run::n_inputs))
@@ -132,9 +138,7 @@ impl Spread {
     /// How much happens in a window: the sum of its variances over those of all runs.
     fn varies(&self, run: &Run, start: usize, length: usize) -> f64 {
         let share = |signal: usize, all: f64, row: fn(&Run, usize) -> &[f64]| {
-            let mut tally = Tally::default();
-            (start..start + length).for_each(|k| tally.add(row(run, k)[signal], 0.0));
-            let share = tally.std().powi(2) / all;
+            let share = variance((start..start + length).map(|k| row(run, k)[signal])) / all;
             if share.is_finite() { share } else { 0.0 }
         };
         let inputs = self.inputs.iter().enumerate();
@@ -164,9 +168,7 @@ impl Spread {
                 let within: f64 = windows
                     .iter()
                     .map(|window| {
-                        let mut tally = Tally::default();
-                        (0..window.len()).for_each(|k| tally.add(window.sample(k)[i], 0.0));
-                        let variance = tally.std().powi(2);
+                        let variance = variance((0..window.len()).map(|k| window.sample(k)[i]));
                         let share = window.len() as f64 / samples as f64;
                         if variance.is_finite() {
                             share * variance

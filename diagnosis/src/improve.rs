@@ -211,12 +211,9 @@ impl State {
             if present.cancelled || !undetermined && !may_blur {
                 return Ok(present);
             }
-            let Some(mut without) = without_step(&present.model, last) else {
+            let Some(without) = self.without_last(&present.model) else {
                 return Ok(present);
             };
-            if let Some(before) = self.before.take() {
-                take_values(&mut without, &before);
-            }
             let alone = fit(&without, measurements, settings, work)?;
             if !undetermined && !blurs(&alone, &present, missing.undetermined, improve.blurs) {
                 return Ok(present);
@@ -229,16 +226,21 @@ impl State {
 
     /// Takes the last step back. Whether there was one.
     fn take_back(&mut self) -> bool {
-        let Some(mut without) = (self.steps.last()).and_then(|l| without_step(&self.present, l))
-        else {
-            return false;
-        };
+        let without = self.without_last(&self.present.clone());
+        without.is_some_and(|without| {
+            self.present = without;
+            self.steps.pop().is_some()
+        })
+    }
+
+    /// A `model` without the effect of the last step, with the values from before it where they are known; none where
+    /// there is no such step.
+    fn without_last(&mut self, model: &Model) -> Option<Model> {
+        let mut without = without_step(model, self.steps.last()?)?;
         if let Some(before) = self.before.take() {
             take_values(&mut without, &before);
         }
-        self.present = without;
-        self.steps.pop();
-        true
+        Some(without)
     }
 
     /// The verdict on the steps that remain: that nothing is missing was said with all of them.

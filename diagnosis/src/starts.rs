@@ -6,7 +6,7 @@ use loopsight_core::{Channel, Place, Shows};
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 
-use crate::candidates::Candidate;
+use crate::candidates::{Candidate, is_per_way};
 use crate::judge::nrmse;
 use crate::problem::{Problem, declared};
 use crate::settings::FitSettings;
@@ -128,7 +128,7 @@ fn starts(
             vec![nearest(neutral + step)]
         } else {
             // What is counted per way depends on how far the machine goes.
-            let per_way = parameter.declaration.unit == "1/position" && candidate.reach > 0.0;
+            let per_way = is_per_way(parameter.declaration) && candidate.reach > 0.0;
             let unit = if per_way { candidate.reach } else { 1.0 };
             listed.into_iter().map(|v| nearest(v / unit)).collect()
         };
