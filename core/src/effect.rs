@@ -62,6 +62,9 @@ pub struct EffectMeta {
     /// It looks back in time at its channel, through [`Reading::past`]. Such effects are evaluated
     /// first at their channel, once per integration step.
     pub memory: bool,
+    /// How far ahead it sees its channel, s, beside the past: an effect of how a recording was written, which is known to
+    /// its end. In a running loop there is nothing to see, and the newest value holds.
+    pub ahead_s: f64,
     /// Longest integration step that follows its states, s: a model with it takes none longer, whatever
     /// its plant and its file allow.
     pub max_step_s: f64,
@@ -90,6 +93,7 @@ impl EffectMeta {
         parameters: &[],
         states: 0,
         memory: false,
+        ahead_s: 0.0,
         max_step_s: f64::INFINITY,
     };
 }
@@ -117,7 +121,7 @@ pub struct Reading<'a, S> {
     /// All signals of the plant: states, inputs, outputs. Those that nobody asked for may be of an
     /// earlier instant.
     pub signals: &'a [S],
-    /// The channel's nominal value in the past.
+    /// The channel's nominal value in the past, and in the future as far as [`EffectMeta::ahead_s`] says and it is known.
     pub past: &'a dyn Past<S>,
 }
 

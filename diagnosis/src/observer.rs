@@ -326,11 +326,7 @@ impl<'a> Design<'a> {
                 for (i, state) in simulator.state_mut().iter_mut().enumerate() {
                     *state = variable(x[i], i.wrapping_sub(first));
                 }
-                simulator.advance_between(
-                    run.time()[k] - run.time()[0],
-                    run.input(k - 1),
-                    run.input(k),
-                );
+                simulator.advance_to(run, k);
                 simulator.measure(&mut predicted);
                 for column in first..(first + DUAL_WIDTH).min(nx) {
                     for (row, state) in simulator.state().iter().enumerate() {

@@ -77,16 +77,16 @@ impl Positions {
         n_measured: usize,
         mut each: impl FnMut(usize, &[S]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let Some(&start) = run.time().first() else {
+        if run.is_empty() {
             return Ok(());
-        };
+        }
         let mut predicted = vec![S::zero(); n_measured];
         simulator.reset(x0, run.input(0));
         for k in 0..run.len() {
             let mut interval = 0.0;
             if k > 0 {
                 interval = run.time()[k] - run.time()[k - 1];
-                simulator.advance_between(run.time()[k] - start, run.input(k - 1), run.input(k));
+                simulator.advance_to(run, k);
             }
             simulator.measure(&mut predicted);
             each(k, &predicted)?;

@@ -308,13 +308,13 @@ pub(crate) fn one_step(
         for (x, c) in next.state_mut().iter_mut().zip(correction.iter()) {
             *x += c;
         }
-        next.advance_between(run.time()[k], run.input(k - 1), run.input(k));
+        next.advance_to(run, k);
         next.measure(&mut outputs);
         each(k, &outputs);
         if let Some(observer) = run.observer() {
             free.correct(observer, k - 1, run.sample(k - 1), &before);
         }
-        free.advance_between(run.time()[k], run.input(k - 1), run.input(k));
+        free.advance_to(run, k);
     }
     Ok(())
 }

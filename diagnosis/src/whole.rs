@@ -114,9 +114,9 @@ impl Problem<'_> {
         x0: &[f64],
         sums: &mut Sums,
     ) -> Result<(), Cancelled> {
-        let Some(start) = run.time().first().copied() else {
+        if run.is_empty() {
             return Ok(());
-        };
+        }
         // The unknowns that this run depends on: all parameters, its own initial state.
         let parameters = self.free.len();
         let before = parameters + index * self.visible.len();
@@ -146,11 +146,7 @@ impl Problem<'_> {
             for (block, simulator) in simulators.iter_mut().enumerate() {
                 if k > 0 {
                     now = run.time()[k] - run.time()[k - 1];
-                    simulator.advance_between(
-                        run.time()[k] - start,
-                        run.input(k - 1),
-                        run.input(k),
-                    );
+                    simulator.advance_to(run, k);
                 }
                 simulator.measure(&mut predicted);
                 let first = block * DUAL_WIDTH;

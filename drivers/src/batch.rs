@@ -41,20 +41,28 @@ pub fn simulate_inputs(
             format!("row {} holds {}", bad / n_inputs, inputs[bad]),
         ));
     }
-    let mut inputs = Rows::new(n_inputs, inputs.to_vec());
-    let mut measured = Rows::new(n_measured, vec![0.0; time.len() * n_measured]);
-    for (k, row) in measured.values.chunks_exact_mut(n_measured).enumerate() {
+    let later = |pair: &&[f64]| !(pair[1] > pair[0] && (pair[1] - pair[0]).is_finite());
+    if let Some(pair) = time.windows(2).find(later) {
+        return Err(BuildError::at(
+            "time",
+            format!(
+                "{} s is followed by {} s, expected times that increase",
+                pair[0], pair[1]
+            ),
+        ));
+    }
+    let mut inputs = inputs.to_vec();
+    for row in inputs.chunks_exact_mut(n_inputs.max(1)) {
+        robot.limit(row);
+    }
+    let missing = Rows::new(n_measured, vec![f64::NAN; time.len() * n_measured]);
+    let commands = Run::new("", time.to_vec(), Rows::new(n_inputs, inputs), missing)
+        .map_err(|error| BuildError::at("time", error.to_string()))?;
+    let mut measured = vec![0.0; time.len() * n_measured];
+    for (k, row) in measured.chunks_exact_mut(n_measured).enumerate() {
         if k > 0 {
-            let (from, to) = (time[k - 1], time[k]);
-            if !(to > from && (to - from).is_finite()) {
-                return Err(BuildError::at(
-                    "time",
-                    format!("{from} s is followed by {to} s, expected times that increase"),
-                ));
-            }
-            let before = &mut inputs.values[(k - 1) * n_inputs..k * n_inputs];
-            robot.limit(before);
-            robot.advance(to - time[0], before);
+            robot.foresee(&commands, k);
+            robot.advance(time[k] - time[0], commands.input(k - 1));
         }
         if !robot.measure(row) {
             return Err(BuildError::at(
@@ -67,9 +75,8 @@ pub fn simulate_inputs(
             row.fill(f64::NAN);
         }
     }
-    let last = inputs.values.len().saturating_sub(n_inputs);
-    robot.limit(&mut inputs.values[last..]);
-    Run::new("", time.to_vec(), inputs, measured)
+    commands
+        .with_measured(measured)
         .map_err(|error| BuildError::at("time", error.to_string()))
 }
 

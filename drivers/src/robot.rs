@@ -3,6 +3,7 @@
 use loopsight_model::config::nearest;
 use loopsight_model::model::Model;
 use loopsight_model::registry::BuildError;
+use loopsight_model::run::Run;
 use loopsight_model::simulate::Simulator;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -86,6 +87,11 @@ impl Robot {
     /// Integrates to `until` (s since the start) with `input` applied.
     pub(crate) fn advance(&mut self, until: f64, input: &[f64]) {
         self.simulator.advance(until, input);
+    }
+
+    /// The inputs of `run` are known as far ahead as effects see from its `k`-th sample.
+    pub(crate) fn foresee(&mut self, run: &Run, k: usize) {
+        self.simulator.foresee(run, k);
     }
 
     /// Clamps `input` to the limits.

@@ -70,6 +70,7 @@ effects! {
     InputSaturation "input_saturation" Twil "amplifiers that stop below the commanded 9 V",
     InputPower "input_power" Twil "speed controllers whose voltage goes with a power of the command",
     InputDelay "input_delay" Twil "commands that take effect late",
+    InputLead "input_lead" Twil "commands that the log writes down after they were sent",
     ActuatorLag "actuator_lag" Twil "a filter before both amplifiers",
     BridgeCoast "bridge_coast" Twil "motor drivers that let go of the motors at command zero",
     InputOffset "input_offset" Twil "a bias on the right amplifier",

@@ -32,6 +32,8 @@ pub struct Live {
     pub(crate) odometry: Odometry,
     pub(crate) hidden: Vec<Concealed>,
     pub(crate) signals: usize,
+    /// Periods from a command to its line in a log.
+    pub(crate) logged_late: usize,
 }
 
 impl Live {
@@ -70,6 +72,7 @@ impl Live {
         Ok(Self {
             odometry: Odometry::new(physics.odometry, phase, STEP),
             signals: physics.odometry.signals,
+            logged_late: physics.logged_late,
             hidden,
             machine: Machine::new(physics),
         })

@@ -91,6 +91,8 @@ pub(crate) struct Physics {
     /// Centre of mass ahead of the axle, m.
     pub(crate) mass_offset: f64,
     pub(crate) payload: Option<Payload>,
+    /// Periods from the command to its line in a log.
+    pub(crate) logged_late: usize,
     pub(crate) odometry: OdometryParts,
 }
 
@@ -118,6 +120,7 @@ impl Physics {
             slope: None,
             mass_offset: 0.0,
             payload: None,
+            logged_late: 0,
             odometry: OdometryParts::new(robot, &body),
         }
     }

@@ -122,6 +122,7 @@ fn along_driven(
         mut odometry,
         mut hidden,
         signals,
+        logged_late,
     } = Live::with_winding(driven, effects, seed, winding_time_constant)?;
     let drives = driven.drives();
 
@@ -131,8 +132,11 @@ fn along_driven(
         let (counted, smooth) = odometry.sample(PERIOD);
         run.push(k as f64 / 100.0, &command[..drives], &counted[..signals])?;
         exact.extend(&smooth[..signals]);
+        // What is written down now was sent earlier, and what is sent now is written down later.
+        let sent = commands.get(k + logged_late).or(commands.last());
+        let sent = *sent.unwrap_or(command);
         for step in 1..=STEPS {
-            machine.step(*command);
+            machine.step(sent);
             odometry.step(machine.angles(), step == STEPS);
         }
     }

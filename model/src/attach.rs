@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::config::{ConfigError, PathSegment, TomlSource, nearest};
 use crate::model::{Attached, ModelParameter, signal_index, signals};
 use crate::registry::{EffectPart, ReadyEffect};
-use loopsight_core::{Channel, EffectMeta, PlantMeta, Role};
+use loopsight_core::{Channel, EffectMeta, Place, PlantMeta, Role};
 
 /// Binds the effect `part`, the `index`-th of the file, to its channels and adds its parameters.
 pub(crate) fn attach(
@@ -14,6 +14,7 @@ pub(crate) fn attach(
     index: usize,
     parameters: &mut Vec<ModelParameter>,
     source: &TomlSource,
+    effects: &[Attached],
 ) -> Result<Attached, Box<ConfigError>> {
     let meta = part.meta();
     let base: Vec<PathSegment> = vec!["effect".into(), index.into(), meta.id.into()];
@@ -63,6 +64,16 @@ pub(crate) fn attach(
                 Some(format!("channels where it fits: {}", fitting.join(", "))),
             ));
         }
+    }
+    if let Some((other, channel)) = shifted_already(effects, ready.meta, &at) {
+        return Err(source.error(
+            &path(&[part.at_key().into()]),
+            &format!(
+                "`{}` cannot act on `{channel}`: `{other}` shifts that input in time already",
+                meta.id
+            ),
+            Some("one time is enough: keep one of the two".to_owned()),
+        ));
     }
     Ok(bind(plant, ready, at, &base, parameters))
 }
@@ -186,6 +197,22 @@ pub fn misfit(channel: &Channel, effect: &EffectMeta) -> Option<String> {
                 role.name()
             )
         })
+}
+
+/// The first of `effects` that shifts an input in time which an effect with memory at the channels `at` would shift as
+/// well, and that input. Both would take the command as it was logged, and the second would undo the first.
+pub(crate) fn shifted_already(
+    effects: &[Attached],
+    meta: &EffectMeta,
+    at: &[&'static Channel],
+) -> Option<(&'static str, &'static str)> {
+    let shifts = |effect: &&Attached| meta.memory && effect.meta.memory;
+    effects.iter().filter(shifts).find_map(|effect| {
+        let here = |c: &&&Channel| {
+            matches!(c.place, Place::Input(_)) && effect.at.iter().any(|other| other.id == c.id)
+        };
+        at.iter().find(here).map(|c| (effect.meta.id, c.id))
+    })
 }
 
 /// The channels of a plant that an effect can act on.

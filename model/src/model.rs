@@ -121,7 +121,8 @@ impl Model {
 
         let mut effects = Vec::new();
         for (index, part) in file.effect.iter().enumerate() {
-            let attached = attach(plant, part.as_ref(), index, &mut parameters, source)?;
+            let part = part.as_ref();
+            let attached = attach(plant, part, index, &mut parameters, source, &effects)?;
             effects.push(attached);
         }
         make_names_unique(&mut parameters, &effects);

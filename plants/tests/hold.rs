@@ -70,4 +70,52 @@ fn effects_see_the_ramp() {
     let speed = ramp(&axis(&delayed))[20];
     let expected = exact(4.0, 6.0, 2.0 - delay);
     assert!((speed - expected).abs() < 1e-5, "{speed} {expected}");
+
+    // It starts `lead` up the ramp: the ramp of before, and a constant for as long.
+    let lead = 0.13;
+    let ahead = format!(
+        "{FIRST_ORDER}\n[[effect]]\n[effect.input_lead]\nat = [\"input\"]\nlead = {lead}\n"
+    );
+    let speed = ramp(&axis(&ahead))[10];
+    let constant = 6.0 * lead / 4.0 * (1.0 - (-4.0f64).exp());
+    let expected = exact(4.0, 6.0, 1.0) + constant;
+    assert!((speed - expected).abs() < 1e-5, "{speed} {expected}");
+}
+
+/// A recording is known to its end; where commands come one by one, they act as they come.
+#[test]
+fn a_lead_needs_a_recording() {
+    let at = |lead: f64| {
+        let effect = format!("[[effect]]\n[effect.input_lead]\nat = [\"input\"]\nlead = {lead}\n");
+        axis(&effect)
+    };
+    let (early, prompt) = (at(0.1), at(0.0));
+    let (known, plain) = (ramp(&early), ramp(&prompt));
+    let ahead = |k: usize| 2.0 * PERIOD * (k + 1) as f64;
+    let mut simulator = Simulator::new(&prompt, &prompt.values());
+    simulator.reset(&[0.0, 0.0], &[0.0]);
+    let mut live = Simulator::new(&early, &early.values());
+    let mut speed = [0.0];
+    for k in 0..20 {
+        simulator.measure(&mut speed);
+        assert!((speed[0] - known[k]).abs() < 1e-9, "{k}");
+        simulator.advance(PERIOD * (k + 1) as f64, &[ahead(k)]);
+        live.measure(&mut speed);
+        assert!((speed[0] - plain[k]).abs() < 1e-9, "{k}");
+        live.advance(PERIOD * (k + 1) as f64, &[2.0 * PERIOD * k as f64]);
+    }
+    assert!((known[10] - plain[10]).abs() > 0.1);
+}
+
+/// Both shift the command as it was logged, so one of them would be without effect.
+#[test]
+fn an_input_is_shifted_once() {
+    let one = |id: &str| format!("[[effect]]\n[effect.{id}]\nat = [\"input\"]\n");
+    let plant = "[plant.dc_axis]\nK_A = -4.0\nK_C = 3.0\n";
+    let two = format!("{plant}{}{}", one("input_delay"), one("input_lead"));
+    let error = Model::from_toml("axis.toml", &two).unwrap_err().to_string();
+    let expected = "`input_delay` shifts that input in time already";
+    assert!(error.contains(expected), "{error}");
+    let delayed = axis(&one("input_delay"));
+    assert!(delayed.with_effect("input_lead", &["input"]).is_none());
 }

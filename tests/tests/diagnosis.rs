@@ -110,6 +110,13 @@ fn a_power_law_is_found_with_its_exponent() {
     finds_under(Experiment::Mixed, Hidden::InputPower, 1.0, 7);
 }
 
+/// Found in the log alone, whose commands come two lines late.
+#[test]
+#[ignore = "seconds: run in release"]
+fn a_command_that_is_logged_late_is_found() {
+    finds(Hidden::InputLead, 1.0, 1);
+}
+
 /// The plain model leaves as much as a constant would, so the search begins afresh; also where the file has no values
 /// to begin with.
 #[test]

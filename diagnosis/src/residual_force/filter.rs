@@ -134,7 +134,8 @@ impl<'m> Linear<'m> {
     }
 
     /// `[A B]`, rows: states, then measured signals.
-    fn step(&mut self, x: &[f64], until: f64, input: &[f64]) -> DMatrix<f64> {
+    fn step(&mut self, x: &[f64], run: &Run, k: usize) -> DMatrix<f64> {
+        let (until, input) = (run.time()[k] - run.time()[0], run.input(k - 1));
         let nx = x.len();
         let columns = nx + self.places.len();
         let mut jacobian = DMatrix::zeros(nx + self.measured, columns);
@@ -155,6 +156,7 @@ impl<'m> Linear<'m> {
             for (i, place) in self.places.iter().enumerate() {
                 simulator.push(*place, seed(0.0, nx + i));
             }
+            simulator.foresee(run, k);
             simulator.advance(until, input);
             simulator.measure(&mut outputs);
             for column in first..last {
@@ -256,7 +258,8 @@ fn filtered(
         work.go_on()?;
         let until = run.time()[k] - run.time()[0];
         let before: Vec<f64> = simulator.signals().to_vec();
-        let ab = linear.step(simulator.state(), until, run.input(k - 1));
+        let ab = linear.step(simulator.state(), run, k);
+        simulator.foresee(run, k);
         simulator.advance(until, run.input(k - 1));
         simulator.measure(&mut outputs);
         // Taken before the measurement corrects the state: the quantities that explain a residual must not depend

@@ -109,11 +109,7 @@ fn batch_of(
                 }
                 simulator.push(*place, push);
             }
-            simulator.advance_between(
-                run.time()[k] - run.time()[0],
-                run.input(k - 1),
-                run.input(k),
-            );
+            simulator.advance_to(run, k);
             simulator.measure(&mut outputs);
             innovation(run.sample(k), &outputs, &rounded, &mut beyond);
             let gain = &filtered.gains[k];

@@ -2,6 +2,7 @@
 
 use crate::amplifier::AmplifierParts;
 use crate::driven::Driven;
+use crate::experiment::PERIOD;
 use crate::motor::{COPPER, Heat};
 use crate::physics::Physics;
 use crate::truth::Concealed;
@@ -49,6 +50,15 @@ pub(super) fn delay(m: &mut Physics, mut of: Concealed) -> Concealed {
     let delay = 0.03 * of.size;
     each(m, &mut of, |a| a.delay += delay);
     of.fitted("delay", delay, "s")
+}
+
+/// The log is written two cycles after the command of its line was sent.
+pub(super) fn logged_late(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_inputs(m, &mut of);
+    let cycles = (2.0 * of.size).round().max(1.0);
+    m.logged_late += cycles as usize;
+    of.fitted("lead", cycles * PERIOD, "s")
+        .physical("cycles", cycles, "1")
 }
 
 /// A filter of 40 ms.

@@ -54,6 +54,7 @@ pub(crate) fn hide(
         H::InputSaturation => input::saturation(machine, concealed),
         H::InputPower => input::power(machine, concealed),
         H::InputDelay => input::delay(machine, concealed),
+        H::InputLead => input::logged_late(machine, concealed),
         H::ActuatorLag => input::lag(machine, concealed),
         H::BridgeCoast => input::coast(machine, concealed),
         H::InputOffset => input::offset(machine, concealed),

@@ -160,6 +160,10 @@ impl<'m> Trial<'m> {
         for bound in self.bounds.all().filter(|b| b.effect == index) {
             let (memory, kind) = (effect.meta.memory, bound.place.kind());
             let sensed = kind == PlaceKind::Output;
+            if effect.meta.ahead_s > 0.0 {
+                let why = "a command acts when it is sent, only its recording is late";
+                return Treatment::Unknown(which, why.to_owned());
+            }
             if memory && (sensed || kind == PlaceKind::Input) {
                 predicted = true;
                 continue;

@@ -4,7 +4,7 @@ use loopsight_core::Channel;
 use serde::Deserialize;
 
 use super::{Attached, Model, ModelParameter};
-use crate::attach::{attach, bind, make_names_unique, misfit};
+use crate::attach::{attach, bind, make_names_unique, misfit, shifted_already};
 use crate::config::{ConfigError, PathSegment, TomlSource};
 use crate::registry::{self, EffectPart};
 
@@ -26,7 +26,8 @@ impl Model {
             .collect();
         let channels = channels?;
         let fits = |c: &&'static Channel| misfit(c, ready.meta).is_none();
-        if channels.is_empty() || !channels.iter().all(fits) {
+        let shifted = shifted_already(&self.effects, ready.meta, &channels).is_some();
+        if channels.is_empty() || shifted || !channels.iter().all(fits) {
             return None;
         }
         let mut model = self.clone();
@@ -53,7 +54,14 @@ impl Model {
         for (index, part) in parsed.effect.iter().enumerate() {
             let first = model.parameters.len();
             let parameters = &mut model.parameters;
-            let attached = attach(self.plant, part.as_ref(), index, parameters, &source)?;
+            let attached = attach(
+                self.plant,
+                part.as_ref(),
+                index,
+                parameters,
+                &source,
+                &model.effects,
+            )?;
             // They stand behind the effects that the model has.
             for parameter in &mut model.parameters[first..] {
                 if let Some(place) = parameter.path.get_mut(1) {

@@ -21,6 +21,8 @@ pub(crate) struct Bound {
     pub(crate) n_z: usize,
     /// Index into the histories, for effects with memory.
     pub(crate) history: Option<usize>,
+    /// How far ahead it sees its channel, s.
+    pub(crate) ahead: f64,
 }
 
 /// All effects of a model by the kind of place they act at, in the model's order. On inputs the laws of an
@@ -61,6 +63,7 @@ impl Bounds {
                     z: first + bounds.states,
                     n_z: effect.meta.states,
                     history,
+                    ahead: effect.meta.ahead_s,
                 };
                 bounds.states += effect.meta.states;
                 match (channel.place, effect.meta.memory) {

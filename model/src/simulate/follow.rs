@@ -45,14 +45,14 @@ pub fn try_follow<'m, S: HostReal, E>(
     run: &Run,
     mut each: impl FnMut(usize, &[S], &mut Simulator<'m, S>) -> Result<(), E>,
 ) -> Result<(), E> {
-    let Some(&start) = run.time().first() else {
+    if run.is_empty() {
         return Ok(());
-    };
+    }
     let mut predicted = vec![S::zero(); simulator.model.measured.len()];
     simulator.reset(x0, run.input(0));
     for k in 0..run.len() {
         if k > 0 {
-            simulator.advance_between(run.time()[k] - start, run.input(k - 1), run.input(k));
+            simulator.advance_to(run, k);
         }
         simulator.measure(&mut predicted);
         each(k, &predicted, simulator)?;

@@ -4,7 +4,7 @@ use crate::registry::HostReal;
 use loopsight_core::Past;
 
 /// Instants of the past that are kept per channel with memory.
-const CAPACITY: usize = 4096;
+pub(super) const CAPACITY: usize = 4096;
 
 /// Spans below this are too short for a difference of integrals, s.
 const SHORT: f64 = 1e-6;
@@ -22,6 +22,8 @@ pub(crate) enum Between {
 #[derive(Clone, Debug)]
 pub(crate) struct History<S> {
     between: Between,
+    /// At an entry the signal is what it is from then on, and not what it was until then.
+    after: bool,
     entries: Vec<Entry<S>>,
     /// Index of the oldest entry once the ring is full.
     oldest: usize,
@@ -39,8 +41,17 @@ impl<S: HostReal> History<S> {
     pub(crate) fn new(between: Between) -> Self {
         Self {
             between,
+            after: false,
             entries: Vec::with_capacity(CAPACITY),
             oldest: 0,
+        }
+    }
+
+    /// The same for effects that look ahead: a lead of zero is differentiated to the side after an entry.
+    pub(crate) fn ahead(between: Between) -> Self {
+        Self {
+            after: true,
+            ..Self::new(between)
         }
     }
 
@@ -75,6 +86,18 @@ impl<S: HostReal> History<S> {
         });
     }
 
+    /// To `time` the signal ran straight, and has `value` there. With this integral the cubic is that line.
+    pub(crate) fn run_to(&mut self, time: f64, value: S) {
+        let integral = match self.entries.len().checked_sub(1) {
+            None => S::zero(),
+            Some(newest) => {
+                let last = self.entry(newest);
+                last.integral + (last.value + value) * S::of(0.5 * (time - last.time))
+            }
+        };
+        self.pass(time, value, integral);
+    }
+
     /// At `time` the signal has `value`, and its integral is `integral`.
     pub(crate) fn pass(&mut self, time: f64, value: S, integral: S) {
         self.push(Entry {
@@ -104,7 +127,7 @@ impl<S: HostReal> History<S> {
     }
 
     /// Integral and value at `time`, at an entry from the side before it: what a delay of zero is
-    /// differentiated to. Before the first and after the last entry the signal is constant.
+    /// differentiated to. A history for effects that look ahead takes the side after it. Before the first and after the last entry the signal is constant.
     fn at(&self, time: S) -> (S, S) {
         let n = self.entries.len();
         if n == 0 {
@@ -113,7 +136,9 @@ impl<S: HostReal> History<S> {
         let (mut low, mut high) = (0, n);
         while high - low > 1 {
             let middle = usize::midpoint(low, high);
-            if self.entry(middle).time < time.value() {
+            let time = time.value();
+            let earlier = self.entry(middle).time;
+            if earlier < time || self.after && earlier == time {
                 low = middle
             } else {
                 high = middle

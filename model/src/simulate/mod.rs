@@ -2,6 +2,7 @@
 
 pub(crate) mod bound;
 mod follow;
+mod foresee;
 pub(crate) mod history;
 mod lengthen;
 mod observer;
@@ -69,6 +70,8 @@ pub struct Simulator<'m, S> {
     slopes: Vec<f64>,
     /// Inputs that run on straight lines between samples.
     ramped: Vec<usize>,
+    /// Samples of a run whose inputs are known to effects that look ahead; 0 where the future is not known.
+    foreseen: usize,
 }
 
 /// The signals that are looked at within a step, each by its index among its kind. Only these are kept up to
@@ -146,11 +149,12 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         let histories = (0..bounds.histories)
             .map(|i| {
                 let smooth = bounds.output_memory.iter().any(|b| b.history == Some(i));
-                History::new(if smooth {
-                    Between::Smooth
-                } else {
-                    Between::Held
-                })
+                let mut inputs = bounds.input_memory.iter();
+                match inputs.find(|b| b.history == Some(i) && b.ahead > 0.0) {
+                    Some(bound) => foresee::history(&model, bound.place),
+                    None if smooth => History::new(Between::Smooth),
+                    None => History::new(Between::Held),
+                }
             })
             .collect();
         let lengthened = (!model.step_given).then(|| Lengthened::new(size));
@@ -182,6 +186,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             ramped: (0..nu)
                 .filter(|i| model.hold(*i) == Hold::FirstOrder)
                 .collect(),
+            foreseen: 0,
             model,
         };
         simulator.reset(&vec![S::zero(); nx], &vec![0.0; nu]);
@@ -302,6 +307,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         for bound in &self.bounds.input_memory {
             if let (Some(history), Place::Input(i)) = (bound.history, bound.place)
                 && self.slopes[i] == 0.0
+                && !self.foresees(bound)
             {
                 self.histories[history].hold(self.time, S::of(input[i]));
             }

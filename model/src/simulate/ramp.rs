@@ -44,15 +44,15 @@ pub(super) fn ramped<S: HostReal>(inputs: &mut [S], bounds: &Bounds, slopes: &[f
     }
 }
 
-/// Remembers the inputs that effects with memory look back on as their means over the step from
-/// `from` on, and leaves these means in `held`: a ramp becomes steps there.
+/// Remembers the inputs that effects with memory look back on as their means over the step `h` from
+/// `from` on, and leaves these means in `held`: a ramp becomes steps there. What is `foreseen` is remembered already.
 pub(super) fn hold_means<S: HostReal>(
     bounds: &Bounds,
     histories: &mut [History<S>],
     held: &mut [S],
     slopes: &[f64],
-    from: f64,
-    h: f64,
+    (from, h): (f64, f64),
+    foreseen: bool,
 ) {
     for (i, (value, slope)) in held.iter_mut().zip(slopes).enumerate() {
         if *slope == 0.0 {
@@ -61,7 +61,9 @@ pub(super) fn hold_means<S: HostReal>(
         let mean = *value + S::of(0.5 * slope * h);
         for bound in &bounds.input_memory {
             if let (Some(history), true) = (bound.history, bound.place == Place::Input(i)) {
-                histories[history].hold(from, mean);
+                if !(foreseen && bound.ahead > 0.0) {
+                    histories[history].hold(from, mean);
+                }
                 *value = mean;
             }
         }

@@ -27,12 +27,20 @@ impl<S: HostReal> Simulator<'_, S> {
             pushed,
             needed,
             slopes,
+            foreseen,
             ..
         } = self;
         let model: &Model = model;
         let ramping = slopes.iter().any(|s| *s != 0.0);
         if ramping {
-            hold_means(bounds, histories, &mut scratch.held, slopes, from, h);
+            hold_means(
+                bounds,
+                histories,
+                &mut scratch.held,
+                slopes,
+                (from, h),
+                *foreseen > 0,
+            );
         }
         for bound in &bounds.input_memory {
             let (Some(history), Place::Input(i)) = (bound.history, bound.place) else {

@@ -11,7 +11,7 @@ mod parts;
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
-use loopsight_core::Parameter;
+use loopsight_core::{Parameter, PlaceKind};
 use loopsight_model::config::TomlSource;
 use loopsight_model::excitation::{Between, Excitation};
 use loopsight_model::identification::LearningSettings;
@@ -99,10 +99,10 @@ fn plant_table() -> BoxedStrategy<(&'static str, String)> {
     proptest::strategy::Union::new(all).boxed()
 }
 
-/// An effect's table on channels of `plant` where it fits.
-fn effect_table(plant: &'static str) -> BoxedStrategy<String> {
+/// An effect's table on channels of `plant` where it fits, and whether it shifts an input in time.
+fn effect_table(plant: &'static str) -> BoxedStrategy<(bool, String)> {
     let meta = plants().into_iter().find(|p| p.id == plant).unwrap();
-    let all: Vec<BoxedStrategy<String>> = effects()
+    let all: Vec<BoxedStrategy<(bool, String)>> = effects()
         .into_iter()
         .filter_map(|effect| {
             let channels: Vec<&str> = meta
@@ -112,8 +112,13 @@ fn effect_table(plant: &'static str) -> BoxedStrategy<String> {
                 .map(|c| c.id)
                 .collect();
             let at = (!channels.is_empty()).then(|| vec(select(channels), 1..3))?;
-            let text = (at, table(effect.parameters)).prop_map(|(at, t)| {
-                format!("\n[[effect]]\n[effect.{}]\nat = {at:?}\n{t}", effect.id)
+            let shifts = effect.memory && effect.places == [PlaceKind::Input];
+            let text = (at, table(effect.parameters)).prop_map(move |(at, t)| {
+                let id = effect.id;
+                (
+                    shifts,
+                    format!("\n[[effect]]\n[effect.{id}]\nat = {at:?}\n{t}"),
+                )
             });
             Some(text.boxed())
         })
@@ -124,7 +129,13 @@ fn effect_table(plant: &'static str) -> BoxedStrategy<String> {
 fn model_text() -> impl Strategy<Value = String> {
     plant_table()
         .prop_flat_map(|(plant, text)| (Just(text), vec(effect_table(plant), 0..4)))
-        .prop_map(|(plant, effects)| format!("{plant}{}", effects.concat()))
+        .prop_map(|(plant, effects)| {
+            // An input is shifted once.
+            let first = effects.iter().position(|(shifts, _)| *shifts);
+            let kept = effects.iter().enumerate();
+            let kept = kept.filter(|(i, (shifts, _))| !shifts || Some(*i) == first);
+            kept.fold(plant, |text, (_, (_, effect))| text + effect)
+        })
 }
 
 /// Reads, writes and reads; returns both readings.
