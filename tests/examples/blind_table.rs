@@ -1,17 +1,15 @@
 //! The blind table: recordings that hide an effect, and what a diagnosis finds in them.
 //!
-//! `cargo run --release -p loopsight-tests --example blind_table -- [--sizes 0.5,1,2]
-//! [--experiments prbs,mixed] [--seeds 2] [--first SEED] [--clean 60] [--only coulomb_friction,arm,tank_pair_dead_zone] [--windings 1e-4] [--write FILE]`
-//!
-//! `--only` takes effects, machines, and recordings by the name of their folder in
-//! `examples/hidden-effect`.
+//! `cargo run --release -p loopsight-tests --example blind_table -- --help`
 //!
 //! Judged on a multi-level recording of the same machine with other seeds. The machine's windings
 //! have a time constant of 0.1 ms, far below what can be seen; everything else about it is
 //! independent of the models that are fitted. The seeds follow from the version number.
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
+use clap::Parser;
 use loopsight_diagnosis::Criteria;
 use loopsight_hidden::{Experiment, Robot, catalogue};
 use loopsight_plants as _;
@@ -20,10 +18,36 @@ use rayon::prelude::*;
 #[path = "blind/mod.rs"]
 mod blind;
 
-use blind::{Case, Recorded, argument};
+use blind::{Case, Recorded};
 
-/// Windings of a motor with an ironless rotor, s.
-const WINDINGS: &str = "1e-4";
+/// What a diagnosis finds in recordings that hide an effect
+#[derive(Parser)]
+struct Arguments {
+    /// Sizes of the effects, in noticeable ones
+    #[arg(long, value_delimiter = ',', default_values_t = [0.5, 1.0, 2.0])]
+    sizes: Vec<f64>,
+    /// Kinds of input
+    #[arg(long, value_delimiter = ',', default_values_t = ["prbs".to_owned(), "mixed".to_owned()])]
+    experiments: Vec<String>,
+    /// Recordings of each kind
+    #[arg(long, default_value_t = 2)]
+    seeds: u64,
+    /// The first seed
+    #[arg(long, default_value_t = fresh())]
+    first: u64,
+    /// Recordings that hide nothing
+    #[arg(long, default_value_t = 60)]
+    clean: u64,
+    /// Only these effects, machines, or recordings by the name of their folder in examples/hidden-effect
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<String>,
+    /// Time constant of the motors' windings, s: those of an ironless rotor
+    #[arg(long, default_value_t = 1e-4)]
+    windings: f64,
+    /// Write the table here
+    #[arg(long)]
+    write: Option<PathBuf>,
+}
 
 /// What stands above the table in a file.
 const HEADER: &str = "\
@@ -88,35 +112,26 @@ impl Held {
 }
 
 fn main() {
-    let list = |name: &str, default: &str| -> Vec<String> {
-        argument(name, default)
-            .split(',')
-            .map(str::to_owned)
-            .collect()
-    };
-    let sizes: Vec<f64> = list("--sizes", "0.5,1,2")
-        .iter()
-        .filter_map(|s| s.parse().ok())
-        .collect();
+    let Arguments {
+        sizes,
+        experiments,
+        seeds,
+        first,
+        clean,
+        only,
+        windings,
+        write,
+    } = Arguments::parse();
     let experiments: Vec<Experiment> = Experiment::ALL
         .into_iter()
-        .filter(|e| {
-            list("--experiments", "prbs,mixed")
-                .iter()
-                .any(|n| n == e.name())
-        })
+        .filter(|e| experiments.iter().any(|n| n == e.name()))
         .collect();
-    let seeds: u64 = argument("--seeds", "2").parse().unwrap_or(2);
-    let first: u64 = argument("--first", "").parse().unwrap_or_else(|_| fresh());
-    let clean: u64 = argument("--clean", "60").parse().unwrap_or(60);
-    let only = argument("--only", "");
-    let windings: f64 = argument("--windings", WINDINGS).parse().unwrap_or(1e-4);
 
     let mut jobs: Vec<Case> = Vec::new();
     for (robot, effect) in catalogue() {
         let case = robot.case(Some(effect));
         let meant = |name: &str| name == case || name == effect.id() || name == robot.name();
-        if !only.is_empty() && !only.split(',').any(meant) {
+        if !only.is_empty() && !only.iter().any(|name| meant(name)) {
             continue;
         }
         for experiment in &experiments {
@@ -179,17 +194,12 @@ fn main() {
         .collect();
     let table = render(&rows);
     println!("{table}");
-    let file = argument("--write", "");
-    if !file.is_empty() {
-        let words: Vec<String> = std::env::args().skip(1).collect();
-        let header = HEADER
-            .replace("{arguments}", &words.join(" "))
-            .replace("{what}", &extent(&sizes, experiments.len(), seeds, clean));
-        match std::fs::write(&file, format!("{header}{table}")) {
-            Ok(()) => eprintln!("wrote {file}"),
-            Err(error) => eprintln!("{file}: {error}"),
-        }
-    }
+    let Some(file) = write else { return };
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let header = HEADER
+        .replace("{arguments}", &words.join(" "))
+        .replace("{what}", &extent(&sizes, experiments.len(), seeds, clean));
+    blind::write(&file, &format!("{header}{table}"));
 }
 
 /// What a table covers, in words.

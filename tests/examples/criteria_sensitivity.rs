@@ -1,14 +1,15 @@
 //! What becomes of the blind table when a criterion is a fifth larger or smaller.
 //!
-//! `cargo run --release -p loopsight-tests --example criteria_sensitivity -- [--recordings 12] [--clean 3]
-//! [--first 31] [--only missing,choice.blur] [--write docs/criteria.md]`
+//! `cargo run --release -p loopsight-tests --example criteria_sensitivity -- --help`
 //!
 //! The recordings are drawn from those of the blind table, always the same ones for the same `--recordings`.
 //! Each is made once; it is then diagnosed by the default criteria, and once for each criterion and each
 //! direction. Groups that decide nothing in a diagnosis are listed without counts.
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
+use clap::Parser;
 use loopsight_diagnosis::{Criteria, Criterion, Reason};
 use loopsight_hidden::{Experiment, Robot, catalogue};
 use loopsight_plants as _;
@@ -18,7 +19,27 @@ use rayon::prelude::*;
 #[path = "blind/mod.rs"]
 mod blind;
 
-use blind::{Case, Recorded, argument};
+use blind::{Case, Recorded};
+
+/// What becomes of the blind table when a criterion is a fifth larger or smaller
+#[derive(Parser)]
+struct Arguments {
+    /// Recordings that hide an effect
+    #[arg(long, default_value_t = 12)]
+    recordings: u64,
+    /// Recordings that hide nothing
+    #[arg(long, default_value_t = 3)]
+    clean: u64,
+    /// The first seed
+    #[arg(long, default_value_t = 31)]
+    first: u64,
+    /// Only these criteria, or groups of them: missing, choice.blur
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<String>,
+    /// Write the page here
+    #[arg(long)]
+    write: Option<PathBuf>,
+}
 
 /// Windings of a motor with an ironless rotor, s.
 const WINDINGS: f64 = 1e-4;
@@ -71,10 +92,14 @@ impl Count {
 }
 
 fn main() {
-    let number = |name: &str, default: u64| argument(name, "").parse().unwrap_or(default);
-    let (some, clean) = (number("--recordings", 12), number("--clean", 3));
-    let recordings = record(some, clean, number("--first", 31));
-    let only = argument("--only", "");
+    let Arguments {
+        recordings,
+        clean,
+        first,
+        only,
+        write,
+    } = Arguments::parse();
+    let recordings = record(recordings, clean, first);
     let plain = Count::of(&recordings, &Criteria::DEFAULT);
     eprintln!("{} recordings: {}", recordings.len(), plain.text());
 
@@ -85,21 +110,18 @@ fn main() {
         let elsewhere = ELSEWHERE.iter().find(|(name, _)| *name == group);
         let effect = match elsewhere {
             Some((_, why)) => format!("{why} | "),
-            None if !only.is_empty() && !only.split(',').any(asked) => "not measured | ".to_owned(),
+            None if !only.is_empty() && !only.iter().any(|name| asked(name)) => {
+                "not measured | ".to_owned()
+            }
             None => moved(criterion, &recordings, plain),
         };
         eprintln!("{}: {effect}", criterion.id);
         let _ = writeln!(rows, "{} {effect} |", row(criterion));
     }
     let page = page(&recordings, plain, &rows);
-    let file = argument("--write", "");
-    if file.is_empty() {
-        println!("{page}");
-    } else {
-        match std::fs::write(&file, page) {
-            Ok(()) => eprintln!("wrote {file}"),
-            Err(error) => eprintln!("{file}: {error}"),
-        }
+    match write {
+        Some(file) => blind::write(&file, &page),
+        None => println!("{page}"),
     }
 }
 

@@ -1,19 +1,21 @@
 //! The field table: what a diagnosis finds in recordings that were made as in the field.
 //!
-//! `cargo run --release -p loopsight-tests --example field_conditions -- [--first SEED]
-//! [--only coarse,spikes] [--write FILE]`
+//! `cargo run --release -p loopsight-tests --example field_conditions -- --help`
 //!
 //! Nine ways in which real logs are worse than those of the blind table, eight effects and none in each.
 //! There is one log, and nothing else to judge on.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 
+use clap::Parser;
 use loopsight_core::Signal;
 use loopsight_diagnosis::{Diagnosis, Measurements, Work, diagnose};
 use loopsight_hidden::{Driven, Experiment, Hidden, Live, PERIOD, Recording, Robot, record_along};
 use loopsight_model::excitation::Excitation;
 use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_plants as _;
 use loopsight_recordings::{Source, map, read_csv_from};
 use rand::{RngExt as _, SeedableRng as _};
@@ -27,14 +29,37 @@ use rayon::prelude::*;
 )]
 mod blind;
 
-use blind::{Case, Recorded, argument};
+use blind::Case;
+
+/// Windings of a motor with an ironless rotor, s.
+const WINDINGS: f64 = 1e-4;
+
+/// What a diagnosis finds in recordings that were made as in the field
+#[derive(Parser)]
+struct Arguments {
+    /// The first seed
+    #[arg(long, default_value_t = 8001)]
+    first: u64,
+    /// Only these conditions: "closed loop,spikes"
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<String>,
+    /// Only these effects
+    #[arg(long, value_delimiter = ',')]
+    effects: Vec<String>,
+    /// Write model files and logs into this folder
+    #[arg(long)]
+    keep: Option<PathBuf>,
+    /// Write the table here
+    #[arg(long)]
+    write: Option<PathBuf>,
+}
 
 /// What stands above the table in a file.
 const HEADER: &str = "\
 # The field table
 
 What `loopsight diagnose` concludes from one log that hides an effect of noticeable size, where the log is as bad
-as those of the field often are, and nothing else is there to judge on. The rules were tried on other seeds (701).
+as those of the field often are, and nothing else is there to judge on. The rules were tried on other seeds (701, 4001).
 Remade by
 
     cargo run --release -p loopsight-tests --example field_conditions -- --write examples/hidden-effect/FIELD.md
@@ -51,7 +76,7 @@ Remade by
 
 `right`: the effect itself, or one in a class with it that the diagnosis says it cannot tell from it, comes first;
 or it is said that the log shows none, where a refit of the plain model leaves less than 1.15 times what counts and
-noise alone would.
+noise alone leave (the readings against the exact ones).
 
 ";
 
@@ -101,7 +126,7 @@ impl Condition {
             time: log.run.time()[k],
             input: log.run.input(k).to_vec(),
             measured: log.run.sample(k).to_vec(),
-            clean: log.run.sample(k).to_vec(),
+            clean: log.exact.sample(k).to_vec(),
         });
         let mut rows: Vec<Row> = rows.collect();
         let deviations = deviations(&rows);
@@ -118,9 +143,14 @@ impl Condition {
                 }
             }
             Self::Spikes => {
-                for (y, deviation) in readings(&mut rows, &deviations) {
-                    if random.random_range(0.0..1.0) < 0.01 {
-                        *y += 10.0 * deviation * if random.random() { 1.0 } else { -1.0 };
+                for row in &mut rows {
+                    for (j, deviation) in deviations.iter().enumerate() {
+                        if random.random_range(0.0..1.0) < 0.01 {
+                            let off = 10.0 * deviation * if random.random() { 1.0 } else { -1.0 };
+                            row.measured[j] += off;
+                            // What is to be left out is no part of the floor.
+                            row.clean[j] += off;
+                        }
                     }
                 }
             }
@@ -154,14 +184,8 @@ fn csv(rows: &[Row], columns: &[String]) -> String {
 }
 
 /// The diagnosis of a log as it would be read from a file.
-fn diagnosed(recorded: &Recorded, rows: &[Row], condition: Condition) -> Option<Diagnosis> {
-    let toml = match condition {
-        // One knows the encoder one has.
-        Condition::Coarse => recorded.log.model_toml.replace("8192", "512"),
-        _ => recorded.log.model_toml.clone(),
-    };
-    let (model, _) = Model::from_toml("hidden", &toml).ok()?;
-    let text = csv(rows, &recorded.log.columns());
+fn diagnosed(toml: &str, text: &str) -> Option<Diagnosis> {
+    let (model, _) = Model::from_toml("hidden", toml).ok()?;
     let table = read_csv_from(text.as_bytes(), "field.csv").ok()?;
     let signals = model.plant.states.iter().chain(model.plant.outputs);
     let signals: Vec<Signal> = signals.copied().collect();
@@ -231,12 +255,15 @@ fn late_rows(log: &Recording, random: &mut ChaCha8Rng) -> Vec<Row> {
     (0..run.len() - 1)
         .map(|k| {
             let late = random.random_range(0.0..0.3);
-            let between = |j: usize| (1.0 - late) * run.sample(k)[j] + late * run.sample(k + 1)[j];
+            let read =
+                |run: &Run, j: usize| (1.0 - late) * run.sample(k)[j] + late * run.sample(k + 1)[j];
+            let between = |j: usize| read(run, j);
+            let clean = |j: usize| read(&log.exact, j);
             Row {
                 time: run.time()[k] + late * PERIOD,
                 input: run.input(k).to_vec(),
                 measured: (0..run.n_measured()).map(between).collect(),
-                clean: (0..run.n_measured()).map(between).collect(),
+                clean: (0..run.n_measured()).map(clean).collect(),
             }
         })
         .collect()
@@ -252,7 +279,7 @@ fn coarse(case: Case, rows: &[Row]) -> Option<Vec<Row>> {
     };
     let commands: Vec<[f64; 2]> = (0..rows.len()).map(held).collect();
     let hidden: Vec<(Hidden, f64)> = case.effect.map(|e| (e, case.size)).into_iter().collect();
-    let log = record_along(robot, &hidden, &commands, case.seed, 1e-4).ok()?;
+    let log = record_along(robot, &hidden, &commands, case.seed, WINDINGS).ok()?;
     let (exact, period) = (&log.exact, 2.0 * PERIOD);
     // Wheel speeds are (v ± b ω)/r.
     let (radius, half_track) = match robot {
@@ -320,7 +347,7 @@ fn closed_loop(case: Case) -> Option<Vec<Row>> {
     let hidden: Vec<(Hidden, f64)> = case.effect.map(|e| (e, case.size)).into_iter().collect();
     let mut machine = Live::new(case.robot, &hidden, case.seed).ok()?;
     let mut sums = vec![0.0; axes.len()];
-    let mut rows = Vec::new();
+    let mut told = Vec::new();
     for k in 0..2501 {
         let time = k as f64 * PERIOD;
         let measured = machine.sample();
@@ -336,15 +363,18 @@ fn closed_loop(case: Case) -> Option<Vec<Row>> {
             Driven::Axis => asked,
         };
         let commands = commands.map(|v| v.clamp(-9.0, 9.0));
-        rows.push(Row {
-            time,
-            input: commands[..axes.len()].to_vec(),
-            measured: measured[..axes.len()].to_vec(),
-            clean: measured[..axes.len()].to_vec(),
-        });
+        told.push(commands);
         machine.drive(commands);
     }
-    Some(rows)
+    // The same machine along the same commands.
+    let log = record_along(case.robot, &hidden, &told, case.seed, WINDINGS).ok()?;
+    let rows = (0..log.run.len()).map(|k| Row {
+        time: log.run.time()[k],
+        input: log.run.input(k).to_vec(),
+        measured: log.run.sample(k).to_vec(),
+        clean: log.exact.sample(k).to_vec(),
+    });
+    Some(rows.collect())
 }
 
 struct Found {
@@ -355,15 +385,24 @@ struct Found {
 }
 
 fn main() {
-    let first: u64 = argument("--first", "4001").parse().unwrap_or(4001);
+    let Arguments {
+        first,
+        only,
+        effects,
+        keep,
+        write,
+    } = Arguments::parse();
     let mut jobs = Vec::new();
-    let only = argument("--only", "");
     for (i, (condition, name)) in Condition::ALL.into_iter().enumerate() {
-        if !only.is_empty() && !only.split(',').any(|o| o == name) {
+        if !only.is_empty() && !only.iter().any(|o| o == name) {
             continue;
         }
         let hidden = EFFECTS.into_iter().map(Some).chain([None]);
         for (k, effect) in hidden.enumerate() {
+            let id = effect.map_or("nothing", Hidden::id);
+            if !effects.is_empty() && !effects.iter().any(|name| name == id) {
+                continue;
+            }
             let case = Case {
                 robot: effect.map_or(Robot::Twil, Hidden::home),
                 effect,
@@ -376,7 +415,7 @@ fn main() {
     }
     let found: Vec<Found> = jobs
         .into_par_iter()
-        .filter_map(|(condition, name, case)| try_one(condition, name, case))
+        .filter_map(|(condition, name, case)| try_one(condition, name, case, keep.as_deref()))
         .inspect(|f| {
             let mark = if f.right { "ok   " } else { "WRONG" };
             eprintln!("{mark} {:17} {:20} {}", f.condition, f.hidden, f.said);
@@ -384,22 +423,34 @@ fn main() {
         .collect();
     let table = render(&found);
     println!("{table}");
-    let file = argument("--write", "");
-    if !file.is_empty() {
-        match std::fs::write(&file, format!("{HEADER}{table}")) {
-            Ok(()) => eprintln!("wrote {file}"),
-            Err(error) => eprintln!("{file}: {error}"),
-        }
+    if let Some(file) = write {
+        blind::write(&file, &format!("{HEADER}{table}"));
     }
 }
 
-fn try_one(condition: Condition, name: &'static str, case: Case) -> Option<Found> {
-    let mut recorded = case.record(1e-4)?;
+fn try_one(
+    condition: Condition,
+    name: &'static str,
+    case: Case,
+    keep: Option<&Path>,
+) -> Option<Found> {
+    let mut recorded = case.record(WINDINGS)?;
     let rows = condition.of(&recorded.log, recorded.case)?;
-    let diagnosis = diagnosed(&recorded, &rows, condition)?;
-    // What is seen with fine counts may be nothing with coarse ones.
-    recorded.hidden_well |= matches!(condition, Condition::Coarse | Condition::WhiteNoise)
-        && diagnosis.nominal.nrmse < blind::INVISIBLE * floor(&rows);
+    let toml = match condition {
+        // One knows the encoder one has.
+        Condition::Coarse => recorded.log.model_toml.replace("8192", "512"),
+        _ => recorded.log.model_toml.clone(),
+    };
+    let text = csv(&rows, &recorded.log.columns());
+    if let Some(folder) = keep {
+        let stem =
+            format!("{name} {}", case.effect.map_or("nothing", Hidden::id)).replace(' ', "-");
+        blind::write(&folder.join(format!("{stem}.toml")), &toml);
+        blind::write(&folder.join(format!("{stem}.csv")), &text);
+    }
+    let diagnosis = diagnosed(&toml, &text)?;
+    // What is seen with fine counts and a rich input may be nothing in this log.
+    recorded.hidden_well |= diagnosis.nominal.nrmse < blind::INVISIBLE * floor(&rows);
     let said = match (&diagnosis.missing, diagnosis.candidates.first()) {
         (Some(place), Some(best)) => {
             let class = best.indistinguishable_from.len() + 1;

@@ -1,5 +1,7 @@
 //! One blind recording: made, diagnosed, and whether the diagnosis is right.
 
+use std::path::Path;
+
 use loopsight_diagnosis::{
     Conclusion, Criteria, Diagnosis, EffectAt, Explanation, Measurements, Work, diagnose,
 };
@@ -9,10 +11,12 @@ use loopsight_model::model::Model;
 /// A refit of the plain model leaves less than this multiple of the floor: nothing shows.
 pub(crate) const INVISIBLE: f64 = 1.15;
 
-/// What follows the argument `name`, or a default.
-pub(crate) fn argument(name: &str, default: &str) -> String {
-    let mut arguments = std::env::args().skip_while(|a| a != name);
-    arguments.nth(1).unwrap_or_else(|| default.to_owned())
+/// Writes a page, and says so.
+pub(crate) fn write(file: &Path, page: &str) {
+    match std::fs::write(file, page) {
+        Ok(()) => eprintln!("wrote {}", file.display()),
+        Err(error) => eprintln!("{}: {error}", file.display()),
+    }
 }
 
 /// What is recorded.
