@@ -18,7 +18,7 @@ use crate::error::RecordingError;
 use crate::fault::{Fault, FaultKind};
 use crate::faults;
 use crate::plan::Plan;
-use crate::segment::{Segments, segment};
+use crate::segment::{Inputs, Segments, segment};
 use crate::source::Source;
 use crate::table::{Table, TableRun};
 pub(crate) use short::run_names;
@@ -63,7 +63,8 @@ pub struct MappedSignal {
 /// id, or the id, an underscore and a unit.
 ///
 /// Each run begins at time 0. Rows that repeat a time stamp are dropped; a jump back by more than
-/// ten periods starts a new run, and so does a gap above `max(10 periods, 0.5 s)`: the parts of a
+/// ten periods starts a new run, and so does a gap above `max(10 periods, 0.5 s)`, and one above 10 periods
+/// across which the inputs change so much that nobody knows what the machine was told: the parts of a
 /// run `x` are `x`, `x#2`, `x#3`. Runs shorter than 1 s are left out, unless nothing would be
 /// left, or nothing moves in what would be left. All of it is named in [`Recording::faults`].
 ///
@@ -227,6 +228,7 @@ impl<'a> Mapper<'a> {
         // Shifted before scaled: large stamps (microseconds since 1970) keep their digits.
         let origin = rows.get(range.start).map_or(0.0, |row| row[time.column]);
         let mut times = Vec::with_capacity(range.len());
+        let span = range.clone();
         for at in range {
             let stamp = rows[at][time.column];
             self.check(run, at, time, stamp, "the time")?;
@@ -236,7 +238,11 @@ impl<'a> Mapper<'a> {
             times.push((at, shifted));
         }
         self.rows += times.len();
-        let cut = segment(&times);
+        // A channel with a clock of its own says nothing while it stays as it is.
+        let columns = self.plan.inputs.iter().filter_map(|(link, _)| *link);
+        let columns = columns.map(|link| link.column).filter(|_| !self.own_clocks);
+        let inputs = Inputs::new(&rows[span], columns.collect());
+        let cut = segment(&times, &inputs);
         self.count_cuts(run, rows, &cut);
         let first_row = times.first().map_or(0, |(at, _)| *at);
         for part in &cut.parts {

@@ -1,13 +1,22 @@
 //! Time stamps: which rows can be used, and where one run ends and the next begins.
 
+use std::collections::BTreeMap;
+
 use crate::median::median;
 
 /// A jump back by more than this many periods is the start of another run, appended to the file.
 pub(crate) const NEW_RUN_PERIODS: f64 = 10.0;
-/// A step of more than this many periods, and of more than [`GAP_TIME`], is a gap.
+/// A step of more than this many periods, and of more than [`GAP_TIME`], is a gap; so is a shorter one across which
+/// the inputs are [forgotten](Inputs::forgotten).
 pub(crate) const GAP_PERIODS: f64 = 10.0;
 /// See [`GAP_PERIODS`]; s.
 pub(crate) const GAP_TIME: f64 = 0.5;
+/// Least length of the parts on either side of a gap that is shorter than [`GAP_TIME`]: nothing is left out because of
+/// it; s.
+const PART_TIME: f64 = 1.0;
+/// Correlation of an input with itself across a gap, below which what it was before says less about it than its
+/// mean does: `1 - ρ` of its variance is unknown at the end of the gap, more than half.
+const FORGOTTEN: f64 = 0.5;
 
 /// What was done about the time stamps of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,8 +34,38 @@ pub(crate) struct Segments {
     pub(crate) gaps: Vec<(usize, f64)>,
 }
 
-/// Cuts the rows of a run where their time stamps, in seconds, jump.
-pub(crate) fn segment(times: &[(usize, f64)]) -> Segments {
+/// The inputs of the rows of a run.
+pub(crate) struct Inputs<'r> {
+    rows: &'r [&'r [f64]],
+    columns: Vec<usize>,
+}
+
+impl<'r> Inputs<'r> {
+    /// Those in some `columns`.
+    pub(crate) fn new(rows: &'r [&'r [f64]], columns: Vec<usize>) -> Self {
+        Self { rows, columns }
+    }
+
+    /// Whether an input is another one after so many `rows`, by its autocorrelation
+    /// `ρ = 1 - mean (u(k + rows) - u(k))²/(2 σ²)`. Where rows were lost for that long, nobody knows
+    /// what the machine was told.
+    fn forgotten(&self, rows: usize) -> bool {
+        self.columns.iter().any(|column| {
+            let values = self.rows.iter().map(|row| row[*column]);
+            let n = self.rows.len() as f64;
+            let mean = values.clone().sum::<f64>() / n;
+            let variance = values.clone().map(|u| (u - mean).powi(2)).sum::<f64>() / n;
+            let later = values.clone().skip(rows);
+            let pairs = self.rows.len().saturating_sub(rows) as f64;
+            let change = values.zip(later).map(|(u, v)| (v - u).powi(2)).sum::<f64>() / pairs;
+            1.0 - 0.5 * change / variance < FORGOTTEN
+        })
+    }
+}
+
+/// Cuts the rows of a run where their time stamps, in seconds, jump, and where so many rows are missing that the
+/// `inputs` between them are not known.
+pub(crate) fn segment(times: &[(usize, f64)], inputs: &Inputs<'_>) -> Segments {
     let mut steps: Vec<f64> = times
         .windows(2)
         .map(|w| w[1].1 - w[0].1)
@@ -37,6 +76,9 @@ pub(crate) fn segment(times: &[(usize, f64)]) -> Segments {
     let mut out = Segments::default();
     let mut part: Vec<usize> = Vec::new();
     let (mut origin, mut last) = (f64::NAN, f64::NAN);
+    let end = times.last().map_or(f64::NAN, |(_, time)| *time);
+    // By the number of rows that are missing: there are no more such numbers than rows in `GAP_TIME`.
+    let mut forgotten = BTreeMap::new();
     for &(row, time) in times {
         let step = time - last;
         if part.is_empty() {
@@ -51,7 +93,15 @@ pub(crate) fn segment(times: &[(usize, f64)]) -> Segments {
                 out.backwards.push(row);
                 continue;
             }
-            if restart || step > gap {
+            let mut lost = || {
+                let rows = (step / period) as usize;
+                step > GAP_PERIODS * period
+                    && (last - origin).min(end - time) >= PART_TIME
+                    && *forgotten
+                        .entry(rows)
+                        .or_insert_with(|| inputs.forgotten(rows))
+            };
+            if restart || step > gap || lost() {
                 if restart {
                     out.restarts.push(row);
                 } else {
@@ -74,8 +124,27 @@ pub(crate) fn segment(times: &[(usize, f64)]) -> Segments {
 mod tests {
     use super::*;
 
+    fn with_input(times: &[f64], input: impl Fn(f64) -> f64) -> Segments {
+        let rows: Vec<[f64; 1]> = times.iter().map(|t| [input(*t)]).collect();
+        let rows: Vec<&[f64]> = rows.iter().map(|row| &row[..]).collect();
+        let times: Vec<(usize, f64)> = times.iter().copied().enumerate().collect();
+        segment(&times, &Inputs::new(&rows, vec![0]))
+    }
+
     fn of(times: &[f64]) -> Segments {
-        segment(&times.iter().copied().enumerate().collect::<Vec<_>>())
+        with_input(times, |_| 0.0)
+    }
+
+    #[test]
+    fn lost_rows_cut_where_the_inputs_are_not_known() {
+        let lost = |time: &f64| !(2.0..2.3).contains(time);
+        let times: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).filter(lost).collect();
+        let lengths = |period: f64| -> Vec<usize> {
+            let out = with_input(&times, |t| (t / period).floor() % 2.0);
+            out.parts.iter().map(Vec::len).collect()
+        };
+        assert_eq!(lengths(0.2), [200, 170]);
+        assert_eq!(lengths(2.0), [370], "an input that stays for longer");
     }
 
     fn every_tenth(from: f64, n: usize) -> Vec<f64> {

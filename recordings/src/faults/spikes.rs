@@ -31,6 +31,11 @@ const TOGETHER: usize = 2;
 ///
 /// Two side by side are absurd where each is so far from the mean of those around them, over what is usual for two:
 /// an oscillation of six samples has half a wave there.
+///
+/// The first reading of a run (and the last one likewise) has neighbours on one side only: it is held against
+/// `2 y(1) - y(2)`, which it usually misses by `2 s`. A machine may as well have jumped there. So it is absurd only
+/// where no other change between two neighbours is as large as that from it to the next.
+///
 /// (F. R. Hampel, 1974, "The influence curve and its role in robust estimation", for the scale.) With
 /// Gaussian noise one reading in 10³² is. A signal that changes by steps of its resolution has one such step
 /// as its usual size at least.
@@ -41,7 +46,11 @@ pub(crate) fn take_out(recording: &mut Recording, ids: &[&str]) -> Vec<Fault> {
         let sizes: [f64; TOGETHER] =
             std::array::from_fn(|i| usual(&recording.runs, s, i + 1).max(least));
         let absurd = recording.runs.iter().map(|r| alone(r, s, sizes));
-        let absurd: Vec<Vec<usize>> = absurd.collect();
+        let mut absurd: Vec<Vec<usize>> = absurd.collect();
+        let largest = largest_change(&recording.runs, s, &absurd);
+        for (run, absurd) in recording.runs.iter().zip(&mut absurd) {
+            absurd.extend(ends(run, s, 2.0 * sizes[0], largest));
+        }
         let count: usize = absurd.iter().map(Vec::len).sum();
         let readings: usize = recording.runs.iter().map(Run::len).sum();
         if count == 0 || count as f64 > ACCIDENTS * readings as f64 {
@@ -52,7 +61,10 @@ pub(crate) fn take_out(recording: &mut Recording, ids: &[&str]) -> Vec<Fault> {
             let mut measured = run.measured().to_vec();
             let width = run.n_measured();
             for k in absurd {
-                let (off, _) = apart(run, s, *k, 1);
+                let off = match beside(run, *k) {
+                    Some(beside) => at_end(run, s, *k, beside).0,
+                    None => apart(run, s, *k, 1).0,
+                };
                 if off > worst.0 {
                     worst = (off, run.sample(*k)[s], run.time()[*k]);
                 }
@@ -139,6 +151,48 @@ fn alone(run: &Run, s: usize, sizes: [f64; TOGETHER]) -> Vec<usize> {
     found
 }
 
+/// The two neighbours of the first or the last reading of a run, the nearer one first.
+fn beside(run: &Run, k: usize) -> Option<[usize; 2]> {
+    match k {
+        _ if run.len() < 4 => None,
+        0 => Some([1, 2]),
+        _ if k + 1 == run.len() => Some([k - 1, k - 2]),
+        _ => None,
+    }
+}
+
+/// How far a reading at an end is from the line through those `beside` it, and how far these two are apart; NaN
+/// where one is missing.
+fn at_end(run: &Run, s: usize, k: usize, beside: [usize; 2]) -> (f64, f64) {
+    let [next, second] = beside.map(|k| run.sample(k)[s]);
+    let off = run.sample(k)[s] - (2.0 * next - second);
+    (off.abs(), (next - second).abs())
+}
+
+/// Absurd readings at the ends of a run, where a change from one reading to the next is at most `largest` elsewhere.
+fn ends(run: &Run, s: usize, size: f64, largest: f64) -> Vec<usize> {
+    let absurd = |k: &usize| {
+        beside(run, *k).is_some_and(|beside| {
+            let (off, between) = at_end(run, s, *k, beside);
+            let change = (run.sample(*k)[s] - run.sample(beside[0])[s]).abs();
+            off > FAR * size && between < BETWEEN * off && change > largest
+        })
+    };
+    let last = run.len().saturating_sub(1);
+    [0, last].into_iter().filter(absurd).collect()
+}
+
+/// The largest change between two readings side by side that are neither `absurd` nor at an end.
+fn largest_change(runs: &[Run], s: usize, absurd: &[Vec<usize>]) -> f64 {
+    let changes = runs.iter().zip(absurd).flat_map(|(run, absurd)| {
+        let believed = |k: usize| absurd.binary_search(&k).is_err();
+        (1..run.len().saturating_sub(2))
+            .filter(move |k| believed(*k) && believed(*k + 1))
+            .map(move |k| (run.sample(k + 1)[s] - run.sample(k)[s]).abs())
+    });
+    changes.filter(|d| d.is_finite()).fold(0.0, f64::max)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::fixture::drive_log;
@@ -188,6 +242,27 @@ mod tests {
             found[0].detail.starts_with("16 of 800 readings"),
             "{found:?}"
         );
+    }
+
+    #[test]
+    fn an_absurd_reading_at_an_end_counts_as_missing() {
+        let first = |_: usize, mut row: [f64; 5]| {
+            row[3] += if row[0] == 0.0 { 40.0 } else { 0.0 };
+            row
+        };
+        let log = drive_log(first);
+        assert!(log.runs.iter().all(|r| r.sample(1)[0].is_finite()));
+        assert!(log.runs[0].sample(0)[0].is_nan());
+        // A machine that jumps at its start jumps elsewhere as well.
+        let jumps = |_: usize, mut row: [f64; 5]| {
+            row[3] += if row[0] > 0.005 && row[0] < 2.0 {
+                3.0
+            } else {
+                0.0
+            };
+            row
+        };
+        assert_eq!(spikes(jumps), []);
     }
 
     #[test]
