@@ -44,7 +44,7 @@ pub(crate) fn session<'p>(
     };
     let mut session = match names {
         [model, log] => {
-            let model = Model::from_file(model)?;
+            let model = model_file(model, log)?;
             Session::new(model, read(log)?)?
         }
         [log] if log.extension().is_some_and(|e| e == "toml") => {
@@ -63,6 +63,25 @@ pub(crate) fn session<'p>(
         session = session.test(Log::read(log)?)?;
     }
     Ok(session)
+}
+
+/// The model in a file that stands before a log; another log there is said to be one.
+fn model_file(path: &Path, log: &Path) -> Result<Model> {
+    let is_toml = |path: &Path| path.extension().is_some_and(|e| e == "toml");
+    let model = Model::from_file(path);
+    if model.is_ok() || is_toml(path) || Log::read(path).is_err() {
+        return model;
+    }
+    let (first, second) = (path.display(), log.display());
+    let help = match is_toml(log) {
+        true => "the model file comes first".to_owned(),
+        false => format!(
+            "`fit`, `diagnose` and `improve` take a further recording of the same machine as `--also {second}`"
+        ),
+    };
+    Err(Error::request(format!(
+        "{first} is a log, and no model file: expected MODEL LOG; {help}"
+    )))
 }
 
 /// Writes a page where one is wanted; `make` makes it of the command for its foot.

@@ -16,7 +16,14 @@ fn requests_that_make_no_sense() {
             &["compare", "model.toml", "log.csv", "log.csv"],
             &["log.csv"],
         ),
-        (&["compare", "log.csv", "model.toml"], &["log.csv"]),
+        (
+            &["compare", "log.csv", "model.toml"],
+            &["log.csv is a log", "the model file comes first"],
+        ),
+        (
+            &["compare", "log.csv", "log.csv"],
+            &["log.csv is a log", "--also log.csv"],
+        ),
         (&["compare", "model.toml", "model.toml"], &["model.toml"]),
         (
             &["compare", "model.toml", "log.csv", "--jsn"],
