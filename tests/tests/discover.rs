@@ -115,6 +115,7 @@ const AXIS: &str = "[plant.dc_axis]\n[log.measured]\nspeed = { column = \"speed\
 
 /// An amplifier that is stronger to one side: `u + 0.03 u²`.
 #[test]
+#[ignore = "seconds: `.ci/run` runs it in release"]
 fn the_curve_of_an_amplifier_is_found() {
     let machine = Machine {
         inputs: &["voltage"],
@@ -130,6 +131,7 @@ fn the_curve_of_an_amplifier_is_found() {
 
 /// A contact that corrodes: the current falls by a half per cent each second, whatever drives it.
 #[test]
+#[ignore = "seconds: `.ci/run` runs it in release"]
 fn a_resistance_that_grows_with_time_is_found() {
     let machine = Machine {
         inputs: &["voltage"],
