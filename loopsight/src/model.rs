@@ -162,7 +162,7 @@ impl Model {
         if !parameter.declaration.admits(value) {
             return Err(Error::request(format!(
                 "`{name}` is {value}, expected {}",
-                registry::range_text(parameter.declaration).trim_end()
+                registry::range_text(parameter.declaration)
             )));
         }
         let text = self

@@ -34,24 +34,19 @@ impl Values {
     }
 }
 
-/// The range of a parameter in words, e.g. `a number above 0 kg`.
+/// The range of a parameter in words, e.g. `a number above 0 kg`; a plain number has no unit.
 pub fn range_text(parameter: &Parameter) -> String {
-    let unit = parameter.unit;
-    match (
-        parameter.min.is_finite(),
-        parameter.max.is_finite(),
-        parameter.open,
-    ) {
+    let Parameter { min, max, open, .. } = *parameter;
+    let unit = match parameter.unit {
+        "1" | "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    match (min.is_finite(), max.is_finite(), open) {
         (false, false, _) => "a finite number".to_owned(),
-        (true, false, true) => format!("a number above {} {unit}", parameter.min),
-        (true, false, false) => format!("a number from {} {unit} upwards", parameter.min),
-        (false, true, true) => format!("a number below {} {unit}", parameter.max),
-        (false, true, false) => format!("a number up to {} {unit}", parameter.max),
-        (true, true, _) => {
-            format!(
-                "a number from {} to {} {unit}",
-                parameter.min, parameter.max
-            )
-        }
+        (true, false, true) => format!("a number above {min}{unit}"),
+        (true, false, false) => format!("a number from {min}{unit} upwards"),
+        (false, true, true) => format!("a number below {max}{unit}"),
+        (false, true, false) => format!("a number up to {max}{unit}"),
+        (true, true, _) => format!("a number from {min} to {max}{unit}"),
     }
 }
