@@ -11,6 +11,9 @@ pub enum Shows {
     NeverNegative,
     /// The input at the channel rests at zero between other values.
     InputAtZero,
+    /// The recording is one run. What changes with time alone does not begin anew with every run, and how long the machine
+    /// ran between two of them is not known.
+    OneRun,
 }
 
 /// What an effect says about itself.

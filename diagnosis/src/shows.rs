@@ -25,6 +25,7 @@ pub(crate) fn can_show(
             (0..model.plant.inputs.len()).any(|input| goes_both_ways(input, runs))
                 && channels.all(|c| never_negative(model, c, runs, criteria.negative))
         }
+        Shows::OneRun => runs.len() == 1,
         Shows::InputAtZero => channels.any(|c| rests(c, runs, criteria.rests_s)),
     }
 }
@@ -139,6 +140,19 @@ mod tests {
         assert!(!coasts(|t| if t < 3.9 { 5.0 } else { 0.0 }), "too short");
         assert!(!coasts(|t| 5.0 * (3.0 * t + 0.1).sin()), "in passing");
         assert!(!coasts(|_| 0.0));
+    }
+
+    #[test]
+    fn a_drift_shows_in_one_run() {
+        assert!(shows(Shows::OneRun, "input", |_| 1.0, |_| 0.0));
+        let (axis, _) = Model::from_toml("axis.toml", AXIS).unwrap();
+        let meta = EffectMeta {
+            shows: Shows::OneRun,
+            ..EffectMeta::PLAIN
+        };
+        let two = [Run::empty(1, 1), Run::empty(1, 1)];
+        let criteria = SearchCriteria::DEFAULT;
+        assert!(!can_show(&axis, &meta, &["input"], &two, &criteria));
     }
 
     #[test]

@@ -24,6 +24,8 @@ pub(crate) struct Friction {
     pub(crate) stribeck_speed: f64,
     /// Viscous friction forwards and backwards, N m s/rad.
     pub(crate) viscous: [f64; 2],
+    /// What viscous friction grows by per second, N m/rad.
+    pub(crate) drying: f64,
     /// Drag, N m s²/rad².
     pub(crate) quadratic: f64,
 }
@@ -34,9 +36,9 @@ impl Friction {
         self.coulomb != [0.0; 2] || self.breakaway != 0.0
     }
 
-    /// The smooth part of the torque at speed `w`, N m.
-    pub(crate) fn smooth(&self, w: f64) -> f64 {
-        let viscous = self.viscous[usize::from(w < 0.0)];
+    /// The smooth part of the torque at speed `w`, `time` s after the start, N m.
+    pub(crate) fn smooth(&self, w: f64, time: f64) -> f64 {
+        let viscous = self.viscous[usize::from(w < 0.0)] + self.drying * time;
         -(viscous + self.quadratic * w.abs()) * w
     }
 
@@ -123,11 +125,13 @@ mod tests {
             breakaway: 0.5,
             stribeck_speed: 0.3,
             viscous: [0.1, 0.4],
+            drying: 0.01,
             quadratic: 0.2,
         };
         for k in -20..=20 {
             let w = 0.2 * f64::from(k);
-            assert!(friction.smooth(w) * w <= 0.0);
+            assert!(friction.smooth(w, 0.0) * w <= 0.0);
+            assert!(friction.smooth(w, 9.0) * w <= friction.smooth(w, 0.0) * w);
             let [least, most] = friction.bounds(w);
             assert!(least < 0.0 && most > 0.0);
         }

@@ -178,7 +178,10 @@ impl Machine {
             self.open[k] = demand.open;
         }
         let currents = self.windings.map(|w| w.current);
-        let voltages = self.physics.battery.supply(demanded, currents);
+        let voltages = {
+            let battery = &self.physics.battery;
+            battery.supply(demanded, currents, self.steps as f64 * STEP)
+        };
         let start = self.velocities;
         let (predicted, _) = self.pass(&start, &start, voltages);
         let middle = start.mean(&predicted);
@@ -204,6 +207,7 @@ impl Machine {
         voltages: [f64; 2],
     ) -> (Velocities, [f64; 2]) {
         let physics = &self.physics;
+        let time = (self.steps as f64 + 0.5) * STEP;
         let mut force = self.body_force(middle.body);
         let mut end = *start;
         let mut currents = [0.0; 2];
@@ -233,7 +237,7 @@ impl Machine {
                     through
                 }
             };
-            torque += physics.friction[k].smooth(wheel);
+            torque += physics.friction[k].smooth(wheel, time);
             let cogging = &physics.cogging[k];
             if cogging.amplitude != 0.0 {
                 let angle = cogging.count * wheel_angle + cogging.phase;

@@ -123,9 +123,10 @@ impl Winding {
 /// A battery behind the amplifiers, which switch its voltage on for a share of the time.
 ///
 /// ```text
-/// duty = V_demanded/V_oc, at most ±1     V_motor = duty (V_oc - R_i I)     I = max(0, Σ duty i)
+/// duty = V_demanded/V_oc, at most ±1     V_motor = duty (V_oc - V' t - R_i I)     I = max(0, Σ duty i)
 /// ```
 ///
+/// Amplifiers know the voltage `V_oc` that it had when it was full.
 /// A diode keeps braking motors from charging it, so the voltage only falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Battery {
@@ -133,14 +134,16 @@ pub(crate) struct Battery {
     pub(crate) open_circuit: f64,
     /// Internal resistance, Ohm.
     pub(crate) resistance: f64,
+    /// What the voltage falls by per second, V/s.
+    pub(crate) discharge: f64,
 }
 
 impl Battery {
-    /// What reaches the motors of the voltages demanded, at these currents.
-    pub(crate) fn supply(&self, demanded: [f64; 2], currents: [f64; 2]) -> [f64; 2] {
+    /// What reaches the motors of the voltages demanded, at these currents, `time` s after the start.
+    pub(crate) fn supply(&self, demanded: [f64; 2], currents: [f64; 2], time: f64) -> [f64; 2] {
         let duty = demanded.map(|v| (v / self.open_circuit).clamp(-1.0, 1.0));
         let load = (duty[0] * currents[0] + duty[1] * currents[1]).max(0.0);
-        let voltage = self.open_circuit - self.resistance * load;
+        let voltage = self.open_circuit - self.discharge * time - self.resistance * load;
         duty.map(|d| d * voltage)
     }
 }
@@ -222,11 +225,12 @@ mod tests {
     fn the_battery_only_falls() {
         let battery = Battery {
             open_circuit: 12.0,
+            discharge: 0.0,
             resistance: 1.0,
         };
         for currents in [[0.5, 0.5], [-0.5, 0.2], [-1.0, -1.0]] {
             for demanded in [[9.0, 9.0], [9.0, -9.0], [-3.0, 0.0], [20.0, 6.0]] {
-                let got = battery.supply(demanded, currents);
+                let got = battery.supply(demanded, currents, 0.0);
                 for (v, d) in got.iter().zip(demanded) {
                     assert!(v.abs() <= d.abs().min(12.0) + 1e-12 && v * d >= 0.0);
                 }

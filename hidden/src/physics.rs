@@ -108,6 +108,7 @@ impl Physics {
             battery: Battery {
                 open_circuit: SUPPLY,
                 resistance: 0.0,
+                discharge: 0.0,
             },
             heat: None,
             friction: [Friction::default(); 2],

@@ -119,6 +119,8 @@ fn losses_slow_down() {
         Hidden::DeadZone,
         Hidden::InputSaturation,
         Hidden::BatterySag,
+        Hidden::GainDrift,
+        Hidden::FrictionDrift,
         Hidden::WindingHeating,
         Hidden::WheelSlip,
     ];

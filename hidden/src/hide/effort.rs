@@ -52,6 +52,17 @@ pub(super) fn viscous(m: &mut Physics, mut of: Concealed) -> Concealed {
     )
 }
 
+/// Viscous friction of both wheels that grows by 0.024 V s/rad in a second: to 0.6 V s/rad in 25 s.
+pub(super) fn drying(m: &mut Physics, of: Concealed) -> Concealed {
+    let rate = 0.024 * of.size;
+    let torque = rate * m.motor.torque_per_volt();
+    for friction in &mut m.friction {
+        friction.drying += torque;
+    }
+    of.fitted("rate", rate, "V/rad")
+        .physical("torque_per_angle", torque, "N m/rad")
+}
+
 /// Forwards 0.4 V and 0.1 V s/rad, backwards 1.2 V and 0.4 V s/rad.
 pub(super) fn directional(m: &mut Physics, of: Concealed) -> Concealed {
     let [forward, backward, viscous_forward, viscous_backward] =

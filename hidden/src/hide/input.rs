@@ -104,6 +104,15 @@ pub(super) fn asymmetry(m: &mut Physics, mut of: Concealed) -> Concealed {
     of.fitted("difference", share, "1")
 }
 
+/// The battery's voltage falls by 0.6 % of its first value in a second, whatever the motors do.
+pub(super) fn discharge(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_inputs(m, &mut of);
+    let share = 0.006 * of.size;
+    m.battery.discharge += share * m.battery.open_circuit;
+    of.fitted("rate", -share, "1/s")
+        .physical("discharge", m.battery.discharge, "V/s")
+}
+
 /// An internal resistance of 2 Ohm behind 12 V.
 pub(super) fn sag(m: &mut Physics, mut of: Concealed) -> Concealed {
     at_inputs(m, &mut of);

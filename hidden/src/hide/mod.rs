@@ -37,6 +37,7 @@ pub(crate) fn hide(
         H::StribeckFriction => effort::stribeck(machine, concealed),
         H::ViscousFriction => effort::viscous(machine, concealed),
         H::DirectionalFriction => effort::directional(machine, concealed),
+        H::FrictionDrift => effort::drying(machine, concealed),
         H::QuadraticDrag => effort::drag(machine, concealed),
         H::TorqueRipple => effort::ripple(machine, concealed),
         H::Backlash => effort::backlash(machine, concealed),
@@ -59,6 +60,7 @@ pub(crate) fn hide(
         H::BridgeCoast => input::coast(machine, concealed),
         H::InputOffset => input::offset(machine, concealed),
         H::GainAsymmetry => input::asymmetry(machine, concealed),
+        H::GainDrift => input::discharge(machine, concealed),
         H::BatterySag => input::sag(machine, concealed),
         H::WindingHeating => input::heating(machine, concealed),
         H::SensorDelay => output::delay(machine, concealed),
@@ -91,6 +93,8 @@ pub(crate) fn largest(effect: Hidden) -> f64 {
         H::CentrifugalOffset => 2.1,
         // The limit would be 0.
         H::InputSaturation => 4.0,
+        // The battery would be empty at the end.
+        H::GainDrift => 6.0,
         // The bearings would have less than no friction.
         H::BridgeCoast => 1.0,
         _ => 10.0,

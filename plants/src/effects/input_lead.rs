@@ -29,9 +29,8 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 /// Over an integration step the command is replaced by its mean, which moves continuously with the
 /// lead: its derivative by the lead exists and is exact for the model that is computed.
 ///
-/// Reference: L. Ljung (1999), "System Identification: Theory for the User", 2nd edition, section 14.1 (the time of
-/// sampling against that of the input); K. J. Åström, B. Wittenmark (1997), "Computer-Controlled Systems", 3rd
-/// edition, section 2.3, with a delay below zero.
+/// Reference: K. J. Åström, B. Wittenmark (1997), "Computer-Controlled Systems", 3rd edition, section 2.3, sampling of
+/// systems with time delay; here the delay is below zero.
 #[derive(Clone, Copy, Debug)]
 pub struct InputLead;
 
@@ -45,7 +44,7 @@ impl Effect for InputLead {
         symptom: "the machine answers before the log shows the command: before each step of the command the residual is a short pulse of the size of the motion that came early",
         remedy: "log the command in the cycle in which it is sent, with the time at which it is sent",
         equation: "u_effective(t) = u_log(t + lead)",
-        reference: "Ljung (1999), System Identification, 2nd ed., section 14.1; Åström, Wittenmark (1997), Computer-Controlled Systems, 3rd ed., section 2.3",
+        reference: "Åström, Wittenmark (1997), Computer-Controlled Systems, 3rd ed., section 2.3, with a delay below zero",
         example: "[[effect]]\n[effect.input_lead]\nat = [\"input.right\", \"input.left\"]\nlead = 0.02\n",
         places: &[PlaceKind::Input],
         parameters: &[Parameter::new(
