@@ -4,9 +4,10 @@ use std::borrow::Cow;
 
 use loopsight_core::Real;
 use loopsight_model::model::{Model, pseudo_inverse};
+use loopsight_model::registry::HostReal;
 use loopsight_model::run::Run;
 use loopsight_model::simulate::{Simulator, try_follow};
-use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
+use loopsight_model::{DUAL_WIDTH, DualOf, NARROW_WIDTH, derivative, variable_of};
 use nalgebra::{DMatrix, DVector};
 
 use crate::long::ENOUGH;
@@ -40,7 +41,7 @@ pub(crate) struct By<'a> {
 }
 
 /// Simulates `run` from `x0`, differentiated by the parameters and initial states that are listed
-/// (forward mode, [`DUAL_WIDTH`] at a time).
+/// (forward mode, [`NARROW_WIDTH`] or [`DUAL_WIDTH`] at a time).
 pub(crate) fn sensitivities(
     model: &Model,
     values: &[f64],
@@ -62,53 +63,88 @@ pub(crate) fn sensitivities_with(
     by: By<'_>,
     work: &Work<'_>,
 ) -> Result<Sensitivities, Cancelled> {
-    let By { parameters, states } = by;
-    let columns = parameters.len() + states.len();
+    let columns = by.parameters.len() + by.states.len();
     let rows = run.len() * model.measured.len();
-    let mut predicted = vec![0.0; rows];
-    let mut jacobian = DMatrix::zeros(rows, columns);
-    for first in (0..columns.max(1)).step_by(DUAL_WIDTH) {
-        let last = (first + DUAL_WIDTH).min(columns);
-        let seed = |value: f64, place: Option<usize>| match place {
-            Some(column) if (first..last).contains(&column) => variable(value, column - first),
-            _ => Dual::of(value),
-        };
-        let dual_values: Vec<Dual> = values
-            .iter()
-            .enumerate()
-            .map(|(i, v)| seed(*v, parameters.iter().position(|p| *p == i)))
-            .collect();
-        let dual_x0: Vec<Dual> = x0
-            .iter()
-            .enumerate()
-            .map(|(i, v)| {
-                seed(
-                    *v,
-                    states
-                        .iter()
-                        .position(|s| *s == i)
-                        .map(|k| parameters.len() + k),
-                )
-            })
-            .collect();
-        let mut simulator = Simulator::new(model, &dual_values);
-        let n = model.measured.len();
-        run_with(positions, &mut simulator, &dual_x0, run, n, |k, outputs| {
-            work.go_on()?;
-            for (i, output) in outputs.iter().enumerate() {
-                let row = k * outputs.len() + i;
-                predicted[row] = output.value();
-                for column in first..last {
-                    jacobian[(row, column)] = derivative(output, column - first);
-                }
-            }
-            Ok(())
-        })?;
+    let mut found = Sensitivities {
+        predicted: vec![0.0; rows],
+        jacobian: DMatrix::zeros(rows, columns),
+    };
+    let pass = Pass {
+        positions,
+        model,
+        values,
+        x0,
+        run,
+        by,
+        work,
+    };
+    let mut first = 0;
+    loop {
+        if columns - first <= NARROW_WIDTH {
+            pass.run::<NARROW_WIDTH>(first, &mut found)?;
+            first += NARROW_WIDTH;
+        } else {
+            pass.run::<DUAL_WIDTH>(first, &mut found)?;
+            first += DUAL_WIDTH;
+        }
+        if first >= columns {
+            return Ok(found);
+        }
     }
-    Ok(Sensitivities {
-        predicted,
-        jacobian,
-    })
+}
+
+/// A simulation that is differentiated by some of the unknowns.
+struct Pass<'a> {
+    positions: Option<&'a Positions>,
+    model: &'a Model,
+    values: &'a [f64],
+    x0: &'a [f64],
+    run: &'a Run,
+    by: By<'a>,
+    work: &'a Work<'a>,
+}
+
+impl Pass<'_> {
+    /// Simulates with the derivatives of `N` columns from the `first`.
+    fn run<const N: usize>(&self, first: usize, found: &mut Sensitivities) -> Result<(), Cancelled>
+    where
+        DualOf<N>: HostReal,
+    {
+        let By { parameters, states } = self.by;
+        let last = (first + N).min(parameters.len() + states.len());
+        let seed = |value: f64, place: Option<usize>| match place {
+            Some(column) if (first..last).contains(&column) => variable_of(value, column - first),
+            _ => DualOf::<N>::of(value),
+        };
+        let of_parameter =
+            |(i, v): (usize, &f64)| seed(*v, parameters.iter().position(|p| *p == i));
+        let of_state = |(i, v): (usize, &f64)| {
+            let place = states.iter().position(|s| *s == i);
+            seed(*v, place.map(|k| parameters.len() + k))
+        };
+        let values: Vec<DualOf<N>> = self.values.iter().enumerate().map(of_parameter).collect();
+        let x0: Vec<DualOf<N>> = self.x0.iter().enumerate().map(of_state).collect();
+        let n = self.model.measured.len();
+        let mut simulator = Simulator::new(self.model, &values);
+        run_with(
+            self.positions,
+            &mut simulator,
+            &x0,
+            self.run,
+            n,
+            |k, outputs| {
+                self.work.go_on()?;
+                for (i, output) in outputs.iter().enumerate() {
+                    let row = k * outputs.len() + i;
+                    found.predicted[row] = output.value();
+                    for column in first..last {
+                        found.jacobian[(row, column)] = derivative(output, column - first);
+                    }
+                }
+                Ok(())
+            },
+        )
+    }
 }
 
 /// The free run over `run`, without derivatives; row by row as in [`Sensitivities::predicted`].

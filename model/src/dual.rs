@@ -10,8 +10,16 @@ use loopsight_core::Real;
 /// Number of derivatives one [`Dual`] carries; a fit with more unknowns makes several passes. A
 /// differential drive has six parameters and two initial states that show: with two of an effect it takes one pass.
 pub const DUAL_WIDTH: usize = 10;
+/// The same of a [`NarrowDual`]: enough for an axis, for an effect on a differential drive whose start is known, and for
+/// what a wide pass leaves over.
+pub const NARROW_WIDTH: usize = 6;
 
-/// A value with its derivatives by [`DUAL_WIDTH`] quantities at once: forward-mode differentiation.
+/// A value with its derivatives by [`DUAL_WIDTH`] quantities.
+pub type Dual = DualOf<DUAL_WIDTH>;
+/// A value with its derivatives by few quantities, which costs less than a [`Dual`].
+pub type NarrowDual = DualOf<NARROW_WIDTH>;
+
+/// A value with its derivatives by `N` quantities at once: forward-mode differentiation.
 ///
 /// ```text
 /// (a, a') (b, b') = (a b, a' b + a b')        f((a, a')) = (f(a), f'(a) a')
@@ -24,26 +32,31 @@ pub const DUAL_WIDTH: usize = 10;
 ///
 /// Comparisons look at the value only.
 #[derive(Clone, Copy, Debug)]
-pub struct Dual {
+pub struct DualOf<const N: usize> {
     value: f64,
-    slopes: [f64; DUAL_WIDTH],
+    slopes: [f64; N],
 }
 
 /// The quantity `value`, differentiated by itself: its `index`-th derivative is one.
 pub fn variable(value: f64, index: usize) -> Dual {
-    let mut slopes = [0.0; DUAL_WIDTH];
+    variable_of(value, index)
+}
+
+/// As [`variable`], with any number of derivatives.
+pub fn variable_of<const N: usize>(value: f64, index: usize) -> DualOf<N> {
+    let mut slopes = [0.0; N];
     if let Some(slope) = slopes.get_mut(index) {
         *slope = 1.0;
     }
-    Dual { value, slopes }
+    DualOf { value, slopes }
 }
 
-/// The derivative of `dual` by the `index`-th quantity of its pass; zero beyond [`DUAL_WIDTH`].
-pub fn derivative(dual: &Dual, index: usize) -> f64 {
+/// The derivative of `dual` by the `index`-th quantity of its pass; zero beyond its width.
+pub fn derivative<const N: usize>(dual: &DualOf<N>, index: usize) -> f64 {
     dual.slopes.get(index).copied().unwrap_or(0.0)
 }
 
-impl Dual {
+impl<const N: usize> DualOf<N> {
     /// `(value, slope · self')`: the chain rule.
     #[inline(always)]
     fn chain(self, value: f64, slope: f64) -> Self {
@@ -55,7 +68,7 @@ impl Dual {
     }
 }
 
-impl Add for Dual {
+impl<const N: usize> Add for DualOf<N> {
     type Output = Self;
     #[inline(always)]
     fn add(mut self, other: Self) -> Self {
@@ -67,7 +80,7 @@ impl Add for Dual {
     }
 }
 
-impl Sub for Dual {
+impl<const N: usize> Sub for DualOf<N> {
     type Output = Self;
     #[inline(always)]
     fn sub(mut self, other: Self) -> Self {
@@ -79,7 +92,7 @@ impl Sub for Dual {
     }
 }
 
-impl Mul for Dual {
+impl<const N: usize> Mul for DualOf<N> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -94,7 +107,7 @@ impl Mul for Dual {
     }
 }
 
-impl Div for Dual {
+impl<const N: usize> Div for DualOf<N> {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
@@ -108,7 +121,7 @@ impl Div for Dual {
     }
 }
 
-impl Neg for Dual {
+impl<const N: usize> Neg for DualOf<N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -118,7 +131,7 @@ impl Neg for Dual {
 
 macro_rules! assign {
     ($($trait:ident $method:ident $by:ident),*) => {$(
-        impl $trait for Dual {
+        impl<const N: usize> $trait for DualOf<N> {
             #[inline(always)]
             fn $method(&mut self, other: Self) {
                 *self = self.$by(other);
@@ -128,19 +141,19 @@ macro_rules! assign {
 }
 assign!(AddAssign add_assign add, SubAssign sub_assign sub, MulAssign mul_assign mul, DivAssign div_assign div);
 
-impl PartialEq for Dual {
+impl<const N: usize> PartialEq for DualOf<N> {
     fn eq(&self, other: &Self) -> bool {
         self.value == other.value
     }
 }
 
-impl PartialOrd for Dual {
+impl<const N: usize> PartialOrd for DualOf<N> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         self.value.partial_cmp(&other.value)
     }
 }
 
-impl Zero for Dual {
+impl<const N: usize> Zero for DualOf<N> {
     fn zero() -> Self {
         Self::of(0.0)
     }
@@ -149,18 +162,18 @@ impl Zero for Dual {
     }
 }
 
-impl One for Dual {
+impl<const N: usize> One for DualOf<N> {
     fn one() -> Self {
         Self::of(1.0)
     }
 }
 
-impl Real for Dual {
+impl<const N: usize> Real for DualOf<N> {
     #[inline(always)]
     fn of(value: f64) -> Self {
         Self {
             value,
-            slopes: [0.0; DUAL_WIDTH],
+            slopes: [0.0; N],
         }
     }
     fn value(self) -> f64 {
@@ -266,6 +279,19 @@ mod tests {
             for i in 0..DUAL_WIDTH {
                 assert!((derivative(&got, i) - eps[i]).abs() < 1e-13, "{i}");
             }
+        }
+    }
+
+    /// A narrow one has the digits of a wide one.
+    #[test]
+    fn the_width_changes_no_digit() {
+        fn of<const N: usize>(a: f64, b: f64) -> [f64; 3] {
+            let (x, y) = (variable_of::<N>(a, 1), variable_of::<N>(b, 4));
+            let all = Real::powf(x * x, y) / Real::atan2(x, y) - Real::tanh(x) * Real::exp(y);
+            [all.value(), derivative(&all, 1), derivative(&all, 4)]
+        }
+        for (a, b) in [(0.3, -1.2), (2.0, 0.7)] {
+            assert_eq!(of::<NARROW_WIDTH>(a, b), of::<DUAL_WIDTH>(a, b));
         }
     }
 

@@ -105,7 +105,9 @@ pub mod simulate;
 pub mod supervisor;
 mod values;
 
-pub use dual::{DUAL_WIDTH, Dual, derivative, variable};
+pub use dual::{
+    DUAL_WIDTH, Dual, DualOf, NARROW_WIDTH, NarrowDual, derivative, variable, variable_of,
+};
 
 #[doc(hidden)]
 pub mod __private {

@@ -13,11 +13,11 @@ use super::program::Program;
 use super::states::{self, Motion, Reads, StateTable};
 use super::table::{Ordered, ParameterTable, check_name, check_unit, check_used};
 use super::tree::{Slot, Tree};
-use crate::Dual;
 use crate::attach::unit_at;
 use crate::config::{Mistake, PathSegment};
 use crate::model::signals;
 use crate::registry::{AnyPhysics, EffectPart, ReadyEffect, Values, effects};
+use crate::{Dual, NarrowDual};
 use loopsight_core::{
     Channel, EffectMeta, Parameter, Physics, PlaceKind, PlantMeta, Reading, Real, Role,
 };
@@ -105,7 +105,7 @@ macro_rules! physics {
         }
     )*};
 }
-physics!(f32, f64, Dual);
+physics!(f32, f64, Dual, NarrowDual);
 
 impl EffectTable {
     /// The effect of this table at some channels; made once for the same text.

@@ -8,8 +8,8 @@ use super::program::{FIRST_BANK, MOST_LEAVES, Numbers, Program};
 use super::table::{Ordered, check_used};
 use super::tree::{Slot, Tree};
 use super::{ExpressionError, Names, placed};
-use crate::Dual;
 use crate::config::{Mistake, PathSegment};
+use crate::{Dual, NarrowDual};
 use loopsight_core::{Dynamics, Real, rk4_step};
 
 const PARAMETERS: u8 = FIRST_BANK;
@@ -344,7 +344,7 @@ macro_rules! dynamics {
         }
     )*};
 }
-dynamics!(f32, f64, Dual);
+dynamics!(f32, f64, Dual, NarrowDual);
 
 impl Law {
     /// One step in room for `N` states.

@@ -2,7 +2,7 @@
 
 use super::operation::{Binary, Unary};
 use super::tree::{Slot, Tree};
-use crate::Dual;
+use crate::{Dual, NarrowDual};
 use loopsight_core::Real;
 
 /// Bank of the program's own numbers.
@@ -93,6 +93,7 @@ pub(crate) struct Program {
     doubles: Vec<f64>,
     singles: Vec<f32>,
     duals: Vec<Dual>,
+    narrow: Vec<NarrowDual>,
     saved: usize,
 }
 
@@ -106,7 +107,7 @@ macro_rules! numbers {
         }
     )*};
 }
-numbers!(f64: doubles, f32: singles, Dual: duals);
+numbers!(f64: doubles, f32: singles, Dual: duals, NarrowDual: narrow);
 
 impl Program {
     /// A program whose `i`-th result is the `i`-th of `trees`.
@@ -123,6 +124,9 @@ impl Program {
         }
         program.singles = program.doubles.iter().map(|x| *x as f32).collect();
         program.duals = program.doubles.iter().map(|x| Dual::of(*x)).collect();
+        program.narrow = (program.doubles.iter())
+            .map(|x| NarrowDual::of(*x))
+            .collect();
         program
     }
 

@@ -2,7 +2,7 @@
 
 use loopsight_core::{Dynamics, Physics, Real};
 
-use crate::Dual;
+use crate::{Dual, NarrowDual};
 
 /// A scalar that composed models are run with on a host.
 pub trait HostReal: Real {
@@ -24,12 +24,15 @@ macro_rules! host_real {
         }
     )*};
 }
-host_real!(f32, f64, Dual);
+host_real!(f32, f64, Dual, NarrowDual);
 
 /// A plant for every scalar a host uses.
-pub trait AnyDynamics: Dynamics<f32> + Dynamics<f64> + Dynamics<Dual> {}
-impl<T: Dynamics<f32> + Dynamics<f64> + Dynamics<Dual>> AnyDynamics for T {}
+pub trait AnyDynamics:
+    Dynamics<f32> + Dynamics<f64> + Dynamics<Dual> + Dynamics<NarrowDual>
+{
+}
+impl<T: Dynamics<f32> + Dynamics<f64> + Dynamics<Dual> + Dynamics<NarrowDual>> AnyDynamics for T {}
 
 /// An effect for every scalar a host uses.
-pub trait AnyPhysics: Physics<f32> + Physics<f64> + Physics<Dual> {}
-impl<T: Physics<f32> + Physics<f64> + Physics<Dual>> AnyPhysics for T {}
+pub trait AnyPhysics: Physics<f32> + Physics<f64> + Physics<Dual> + Physics<NarrowDual> {}
+impl<T: Physics<f32> + Physics<f64> + Physics<Dual> + Physics<NarrowDual>> AnyPhysics for T {}
