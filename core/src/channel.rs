@@ -87,7 +87,7 @@ pub enum Role {
     Stall,
     /// Gravity that the plant itself has at this place.
     Gravity,
-    /// Head of a liquid over its outlet: no solids rub on each other here.
+    /// Head of a liquid over its outlet, or of heat over its surroundings: no solids rub on each other here.
     Head,
 }
 

@@ -150,8 +150,15 @@ impl<'a> Holdout<'a> {
                 let loss: f64 = (0..n)
                     .map(|i| {
                         let e = (run.sample(k)[i] - predicted[i]) / std[i];
-                        // A missing sample, or a signal that never moves, counts nothing.
-                        if e.is_nan() { 0.0 } else { e * e }
+                        // A missing sample, or a signal that never moves, counts nothing; a run that diverges
+                        // to no number at all is as wrong as can be.
+                        match (e.is_nan(), predicted[i].is_nan()) {
+                            (false, _) => e * e,
+                            (true, diverged) => {
+                                let judged = diverged && run.sample(k)[i].is_finite();
+                                if judged { f64::INFINITY } else { 0.0 }
+                            }
+                        }
                     })
                     .sum();
                 sum += loss / n as f64;

@@ -12,6 +12,7 @@ const USAGE: &str = "usage:
   loopsight-hidden all -o FOLDER      write every effect's recordings and the index
   loopsight-hidden table              print how much each effect changes the signals
   loopsight-hidden one [ROBOT:]EFFECT[=SIZE][+EFFECT[=SIZE]] prbs|multi_level|mixed SEED -o FILE.csv
+                                      nothing in place of effects: the clean machine
   loopsight-hidden benchmark SEED NOISE -o FILE.csv
                                       the hysteretic oscillator of Noël and Schoukens (2016), noise in m";
 
@@ -53,12 +54,15 @@ fn misused() -> ExitCode {
 fn one(effects: &str, experiment: Experiment, seed: u64, file: &str) -> Result<(), HiddenError> {
     let mut hidden = Vec::new();
     let (name, effects) = effects.split_once(':').unwrap_or(("", effects));
-    for entry in effects.split('+') {
+    for entry in effects.split('+').filter(|entry| *entry != "nothing") {
         let (id, size) = entry.split_once('=').unwrap_or((entry, "1"));
         hidden.push((id.parse::<Hidden>()?, size.parse().unwrap_or(f64::NAN)));
     }
     let named = Robot::ALL.into_iter().find(|r| r.name() == name);
-    let robot = named.unwrap_or_else(|| hidden[0].0.home());
+    let home = hidden
+        .first()
+        .map_or(Robot::Twil, |(effect, _)| effect.home());
+    let robot = named.unwrap_or(home);
     let recording = record(robot, &hidden, experiment, seed)?;
     print!("{}", recording.truth.to_toml());
     recording.write_csv(&PathBuf::from(file))

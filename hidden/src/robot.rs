@@ -22,6 +22,16 @@ pub enum Robot {
     ServoAxis,
     /// A pole balanced on a cart. Plant: `cart_pole`.
     CartPole,
+    /// A motor and a load with a long shaft between them. Plant: `flexible_joint`.
+    FlexibleJoint,
+    /// A joint on a motor whose current is controlled. Plant: `torque_axis`.
+    TorqueAxis,
+    /// A heating element in a block of metal. Plant: `thermal`.
+    Thermal,
+    /// A rod that swings at the end of a turning arm. Plant: `rotary_pendulum`.
+    RotaryPendulum,
+    /// A rod that a fan lifts. Plant: `propeller_pendulum`.
+    PropellerPendulum,
 }
 
 /// How a machine is simulated.
@@ -35,7 +45,7 @@ pub(crate) enum Kind {
 
 impl Robot {
     /// All of them.
-    pub const ALL: [Robot; 7] = [
+    pub const ALL: [Robot; 12] = [
         Self::Twil,
         Self::Axis,
         Self::Oscillator,
@@ -43,6 +53,11 @@ impl Robot {
         Self::Arm,
         Self::ServoAxis,
         Self::CartPole,
+        Self::FlexibleJoint,
+        Self::TorqueAxis,
+        Self::Thermal,
+        Self::RotaryPendulum,
+        Self::PropellerPendulum,
     ];
 
     pub(crate) fn kind(self) -> Kind {
@@ -54,6 +69,11 @@ impl Robot {
             Robot::Arm => Kind::Rig(&machines::ARM),
             Robot::ServoAxis => Kind::Rig(&machines::SERVO_AXIS),
             Robot::CartPole => Kind::Rig(&machines::CART_POLE),
+            Robot::FlexibleJoint => Kind::Rig(&machines::FLEXIBLE_JOINT),
+            Robot::TorqueAxis => Kind::Rig(&machines::TORQUE_AXIS),
+            Robot::Thermal => Kind::Rig(&machines::THERMAL),
+            Robot::RotaryPendulum => Kind::Rig(&machines::ROTARY_PENDULUM),
+            Robot::PropellerPendulum => Kind::Rig(&machines::PROPELLER_PENDULUM),
         }
     }
 

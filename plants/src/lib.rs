@@ -14,6 +14,11 @@
 //! | [`Oscillator`] | a mass on a spring |
 //! | [`TankPair`] | two tanks, one emptying into the other |
 //! | [`CartPole`] | a pole on a cart |
+//! | [`FlexibleJoint`] | a motor and a load with a spring between them |
+//! | [`TorqueAxis`] | a joint driven by a torque or a current |
+//! | [`Thermal`] | a heater and the body that it warms |
+//! | [`RotaryPendulum`] | a pendulum at the end of an arm that turns |
+//! | [`PropellerPendulum`] | a pendulum that a fan lifts |
 //!
 //! The effects are in [`effects`].
 //!
@@ -58,10 +63,16 @@ mod cart_pole;
 mod dc_axis;
 mod ddmr;
 pub mod effects;
+mod flexible_joint;
 mod motor;
 mod oscillator;
+mod places;
+mod propeller_pendulum;
+mod rotary_pendulum;
 mod servo_axis;
 mod tank_pair;
+mod thermal;
+mod torque_axis;
 
 #[cfg(not(feature = "std"))]
 use loopsight_core::{declare_effect, declare_plant};
@@ -72,6 +83,11 @@ pub use arm::Arm;
 pub use cart_pole::CartPole;
 pub use dc_axis::DcAxis;
 pub use ddmr::Ddmr;
+pub use flexible_joint::FlexibleJoint;
 pub use oscillator::Oscillator;
+pub use propeller_pendulum::PropellerPendulum;
+pub use rotary_pendulum::RotaryPendulum;
 pub use servo_axis::ServoAxis;
 pub use tank_pair::TankPair;
+pub use thermal::Thermal;
+pub use torque_axis::TorqueAxis;

@@ -1,14 +1,19 @@
-//! The machines of one command: without an effect their plant explains them.
+//! The machines of one command: without an effect their plant explains them, and the walks of
+//! `examples/plants/README.md` are as they stand there.
 
 #![allow(
     clippy::unwrap_used,
-    reason = "recordings that can be made, and a panic is how this program fails"
+    reason = "recordings that can be made, files that are there, and a panic is how this program fails"
 )]
 
+use std::path::Path;
+
+use assert_cmd::Command;
 use loopsight_diagnosis::{FitSettings, Measurements, Work, diagnose, fit};
 use loopsight_hidden::{Experiment, Hidden, Robot, record};
 use loopsight_model::model::Model;
 use loopsight_plants as _;
+use loopsight_tests::repository;
 
 /// Fitted to a clean recording, the plant leaves of another one what rounding leaves.
 fn explained(robot: Robot) {
@@ -87,4 +92,99 @@ fn a_clean_slide_is_a_servo_axis() {
 #[test]
 fn a_clean_cart_is_a_cart_pole() {
     explained(Robot::CartPole);
+}
+
+#[test]
+fn a_clean_long_shaft_is_a_flexible_joint() {
+    explained(Robot::FlexibleJoint);
+}
+
+#[test]
+fn a_clean_joint_on_a_current_is_a_torque_axis() {
+    explained(Robot::TorqueAxis);
+}
+
+#[test]
+fn a_clean_heater_is_thermal() {
+    explained(Robot::Thermal);
+}
+
+#[test]
+fn a_clean_rod_on_an_arm_is_a_rotary_pendulum() {
+    explained(Robot::RotaryPendulum);
+}
+
+#[test]
+fn a_clean_rod_with_a_fan_is_a_propeller_pendulum() {
+    explained(Robot::PropellerPendulum);
+}
+
+/// A command of a walk, and the lines that its page shows of the answer.
+struct Step {
+    command: String,
+    shown: Vec<String>,
+}
+
+/// The blocks of the console in a page, in order.
+fn steps(page: &str) -> Vec<Step> {
+    let mut steps: Vec<Step> = Vec::new();
+    let mut inside = false;
+    for line in page.lines() {
+        if line.starts_with("```") {
+            inside = line == "```console";
+        } else if let (true, Some(command)) = (inside, line.strip_prefix("$ loopsight ")) {
+            steps.push(Step {
+                command: command.to_owned(),
+                shown: Vec::new(),
+            });
+        } else if let (true, false, Some(step)) = (inside, line.trim() == "…", steps.last_mut()) {
+            step.shown.push(line.to_owned());
+        }
+    }
+    steps
+}
+
+/// Takes the walk of a page in a copy of its folder; a line is as the page has it but for the spaces between words.
+fn walk(folder: &Path, page: &str) {
+    let desk = tempfile::tempdir().unwrap();
+    let recordings = folder.parent().unwrap().join("hidden-effect");
+    let recordings = recordings.to_str().unwrap();
+    let here = desk.path();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, here.join(path.file_name().unwrap())).unwrap();
+    }
+    let words = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
+    for step in steps(page) {
+        let output = Command::new(env!("CARGO_BIN_EXE_loopsight-under-test"))
+            .args(
+                step.command
+                    .split(' ')
+                    .map(|a| a.replace("../hidden-effect", recordings)),
+            )
+            .current_dir(here)
+            .output()
+            .unwrap();
+        let mut said = String::from_utf8(output.stdout).unwrap();
+        said.push_str(&String::from_utf8(output.stderr).unwrap());
+        assert!(output.status.success(), "{}: {said}", step.command);
+        let said: Vec<String> = said.lines().map(words).collect();
+        for line in step.shown.iter().map(|line| words(line)) {
+            assert!(
+                said.contains(&line),
+                "`{}` does not say `{line}` but:\n{}",
+                step.command,
+                said.join("\n")
+            );
+        }
+    }
+}
+
+#[test]
+#[ignore = "minutes: run in release"]
+fn the_walks_of_the_plants_are_as_their_page_says() {
+    let folder = repository().join("examples/plants");
+    let page = std::fs::read_to_string(folder.join("README.md")).unwrap();
+    assert!(steps(&page).len() >= 6);
+    walk(&folder, &page);
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::{Rig, Row, Scale, Sheet, dry, midpoint, quantity};
+use super::{Counter, Rig, Row, Scale, Sheet, dry, midpoint, quantity};
 use crate::Hidden;
 use crate::driven::Motor;
 use crate::friction::Friction;
@@ -40,11 +40,10 @@ pub(super) struct Arm {
     pub(super) weight: f64,
     motor: Motor,
     bearing: Friction,
-    encoder: Scale,
+    counter: Counter,
     current: f64,
     /// Speed, rad/s, and angle, rad.
     pub(super) state: [f64; 2],
-    before: Option<[f64; 2]>,
     pub(super) voltage: f64,
 }
 
@@ -66,10 +65,9 @@ impl Arm {
                 reflected_inertia: 0.0065,
             },
             bearing: Friction::default(),
-            encoder: Scale::new(TAU / COUNTS, phase[0]),
+            counter: Counter::new(Scale::new(TAU / COUNTS, phase[0]), SHEET.rate),
             current: 0.0,
             state: [0.0; 2],
-            before: None,
             voltage: 0.0,
         }
     }
@@ -120,17 +118,13 @@ impl Rig for Arm {
     fn sample(&mut self, command: f64) -> Row {
         self.voltage = command;
         let angle = self.state[1];
-        let now = [self.encoder.read(angle), angle];
-        let [counted, exact] = self.before.map_or([0.0; 2], |before| {
-            [0, 1].map(|i| (now[i] - before[i]) * SHEET.rate)
-        });
-        self.before = Some(now);
+        let [counted, exact] = self.counter.speed(angle);
         let mut row = Row {
             inputs: [command, 0.0],
             ..Row::default()
         };
-        row.measured[..2].copy_from_slice(&[counted, now[0]]);
-        row.exact[..2].copy_from_slice(&[exact, now[1]]);
+        row.measured[..2].copy_from_slice(&[counted, self.counter.encoder.read(angle)]);
+        row.exact[..2].copy_from_slice(&[exact, angle]);
         row
     }
 

@@ -3,11 +3,16 @@
 mod arm;
 mod bouc_wen;
 mod cart_pole;
+mod flexible_joint;
 mod oscillator;
+mod propeller_pendulum;
 mod record;
 mod refit;
+mod rotary_pendulum;
 mod servo_axis;
 mod tank_pair;
+mod thermal;
+mod torque_axis;
 
 #[cfg(test)]
 mod tests;
@@ -19,12 +24,17 @@ use crate::truth::{Concealed, Quantity};
 pub(crate) use arm::SHEET as ARM;
 pub use bouc_wen::hysteretic_benchmark;
 pub(crate) use cart_pole::SHEET as CART_POLE;
+pub(crate) use flexible_joint::SHEET as FLEXIBLE_JOINT;
 pub(crate) use oscillator::SHEET as OSCILLATOR;
+pub(crate) use propeller_pendulum::SHEET as PROPELLER_PENDULUM;
 pub(crate) use record::along_rig;
 pub use refit::Parts;
 pub(crate) use refit::{left, refit};
+pub(crate) use rotary_pendulum::SHEET as ROTARY_PENDULUM;
 pub(crate) use servo_axis::SHEET as SERVO_AXIS;
 pub(crate) use tank_pair::SHEET as TANK_PAIR;
+pub(crate) use thermal::SHEET as THERMAL;
+pub(crate) use torque_axis::SHEET as TORQUE_AXIS;
 
 /// Most signals that a machine here logs.
 const SIGNALS: usize = 4;
@@ -110,6 +120,34 @@ impl Scale {
     /// The value at the middle of the step that `x` is in.
     fn read(&self, x: f64) -> f64 {
         ((x / self.resolution + self.phase).round() - self.phase) * self.resolution
+    }
+}
+
+/// A speed as the difference of an encoder's readings, over the time since the sample before.
+#[derive(Clone, Copy, Debug)]
+struct Counter {
+    encoder: Scale,
+    rate: f64,
+    /// The last angle as read and as it was.
+    before: Option<[f64; 2]>,
+}
+
+impl Counter {
+    /// An encoder that is read `rate` times per second.
+    fn new(encoder: Scale, rate: f64) -> Self {
+        let before = None;
+        Self {
+            encoder,
+            rate,
+            before,
+        }
+    }
+
+    /// The speeds by counts and without rounding; none at the first sample.
+    fn speed(&mut self, angle: f64) -> [f64; 2] {
+        let now = [self.encoder.read(angle), angle];
+        let before = self.before.replace(now).unwrap_or(now);
+        [0, 1].map(|i| (now[i] - before[i]) * self.rate)
     }
 }
 

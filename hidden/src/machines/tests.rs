@@ -2,9 +2,14 @@
 
 use super::arm::Arm;
 use super::cart_pole::CartPole;
+use super::flexible_joint::FlexibleJoint;
 use super::oscillator::Oscillator;
+use super::propeller_pendulum::PropellerPendulum;
+use super::rotary_pendulum::RotaryPendulum;
 use super::servo_axis::ServoAxis;
 use super::tank_pair::TankPair;
+use super::thermal::Thermal;
+use super::torque_axis::TorqueAxis;
 use super::*;
 use crate::{Experiment, Robot, record};
 
@@ -195,16 +200,137 @@ fn a_push_and_friction_change_the_momentum() {
     assert!((rig.state[2] - 0.32).abs() < 1e-3, "{}", rig.state[2]);
 }
 
+/// Without losses the shaft gives back what it takes, and both sides keep their impulse.
+#[test]
+fn a_shaft_that_twists_keeps_energy_and_impulse() {
+    let mut rig = FlexibleJoint::new(PHASE);
+    with(&mut rig, Hidden::CubicStiffness);
+    // Damping of the shaft and both bearings.
+    for loss in [1, 4, 5] {
+        *rig.parts()[loss] = 0.0;
+    }
+    rig.state = [0.02, -0.03, 0.2, -0.1];
+    let (energy, impulse) = (rig.energy(), rig.state[0] + rig.state[1]);
+    for _ in 0..200 {
+        rig.advance();
+        assert!((rig.energy() / energy - 1.0).abs() < 1e-3);
+        assert!((rig.state[0] + rig.state[1] - impulse).abs() < 1e-12);
+    }
+}
+
+/// Driven to a steady speed both sides turn alike, and the torque is what bearings and seals take.
+#[test]
+fn friction_of_both_sides_takes_the_torque() {
+    let mut rig = FlexibleJoint::new(PHASE);
+    with(&mut rig, Hidden::CoulombFriction);
+    with(&mut rig, Hidden::DirectionalFriction);
+    for (torque, dry) in [(0.8, 0.12 + 0.06), (-0.8, -0.12 - 0.14)] {
+        let row = hold(&mut rig, torque, 3000);
+        let speed = (torque - dry) / 0.03;
+        for j in 0..2 {
+            // Friction acts at the ends of the steps: half a step of it is what may be missing.
+            assert!(
+                (row.exact[j] - speed).abs() < 1e-4 * dry.abs() / 0.01,
+                "{row:?}"
+            );
+        }
+    }
+    // Below what sticks nothing moves.
+    let mut rig = FlexibleJoint::new(PHASE);
+    with(&mut rig, Hidden::CoulombFriction);
+    let still = hold(&mut rig, 0.11, 100).exact;
+    assert!(still.iter().all(|speed| speed.abs() < 1e-4), "{still:?}");
+}
+
+#[test]
+fn a_current_turns_the_joint_against_its_friction() {
+    let mut rig = TorqueAxis::new(PHASE);
+    with(&mut rig, Hidden::CoulombFriction);
+    let speed = hold(&mut rig, 2.0, 2000).exact[0];
+    // Friction acts at the ends of the steps: half a step of it is what may be missing.
+    let off = speed - (rig.gain() * 2.0 - 0.25) / rig.oil;
+    assert!(off.abs() < 1.01e-4 * 0.25 / rig.inertia(), "{off}");
+    // 30 ms after a command of 20 ms delay it has had 10 ms of it.
+    let mut rig = TorqueAxis::new(PHASE);
+    with(&mut rig, Hidden::InputDelay);
+    hold(&mut rig, 1.0, 3);
+    let impulse = rig.state[0];
+    let full = rig.gain() * 0.01;
+    assert!((impulse / full - 1.0).abs() < 0.02, "{impulse} {full}");
+}
+
+/// What is put in is in the bodies or in the room; at rest what goes in goes out.
+#[test]
+fn the_heater_loses_no_heat_but_to_the_room() {
+    let mut rig = Thermal::new(PHASE);
+    with(&mut rig, Hidden::QuadraticDrag);
+    let (power, mut gone) = (30.0, 0.0);
+    for _ in 0..400 {
+        rig.sample(power);
+        let out = |rig: &Thermal| rig.out(rig.warmer(rig.heat)[1]);
+        let before = out(&rig);
+        rig.advance();
+        gone += 0.5 * (before + out(&rig));
+    }
+    let kept: f64 = rig.heat.iter().sum();
+    assert!(
+        (kept + gone - 400.0 * power).abs() < 1e-4 * kept,
+        "{kept} {gone}"
+    );
+    hold(&mut rig, power, 4000);
+    let [element, block] = rig.warmer(rig.heat);
+    assert!((rig.out(block) / power - 1.0).abs() < 1e-6);
+    assert!((1.5 * (element - block) / power - 1.0).abs() < 1e-6);
+    assert!(block < power / rig.skin, "air carries more off");
+}
+
+/// Without oil and air, let go far from where it hangs, arm and rod keep their energy; and a torque's impulse
+/// about the axis is all that is there.
+#[test]
+fn arm_and_rod_keep_energy_and_impulse() {
+    let mut rig = RotaryPendulum::new(PHASE);
+    (rig.oil, rig.air) = (0.0, 0.0);
+    rig.state = [2e-3, 0.0, 0.0, 2.5];
+    let before = rig.energy();
+    for _ in 0..200 {
+        rig.advance();
+        assert!((rig.energy() - before).abs() < 1e-4, "{}", rig.energy());
+        assert!((rig.state[0] - 2e-3).abs() < 1e-12);
+    }
+    assert!(rig.state[3].abs() < 2.5 + 1e-6);
+    // Dry friction holds the arm against what is below it.
+    let mut rig = RotaryPendulum::new(PHASE);
+    with(&mut rig, Hidden::CoulombFriction);
+    assert!(hold(&mut rig, 4e-3, 100).exact[1].abs() < 1e-4);
+    assert!(hold(&mut rig, 8e-3, 100).exact[0] > 0.1);
+}
+
+#[test]
+fn a_fan_holds_the_rod_where_it_balances_its_weight() {
+    let mut rig = PropellerPendulum::new(PHASE);
+    with(&mut rig, Hidden::InputPower);
+    with(&mut rig, Hidden::ActuatorLag);
+    let row = hold(&mut rig, -3.0, 4000);
+    // 4 V · (3/4)^1.5 of 0.08 N/V at 0.4 m.
+    let lift = -0.4 * 0.08 * 4.0 * 0.75f64.powf(1.5);
+    assert!((rig.lift() / lift - 1.0).abs() < 1e-9);
+    assert!((rig.weight() * row.exact[0].sin() / lift - 1.0).abs() < 1e-6);
+    // Let go without fan and air it keeps its energy.
+    let mut rig = PropellerPendulum::new(PHASE);
+    *rig.parts()[2] = 0.0;
+    rig.state = [0.0, 1.5];
+    let before = rig.energy();
+    for _ in 0..200 {
+        rig.advance();
+        assert!((rig.energy() - before).abs() < 1e-4);
+    }
+}
+
 /// Each machine stays where it belongs, under every experiment.
 #[test]
 fn nothing_runs_away() {
-    for robot in [
-        Robot::Oscillator,
-        Robot::TankPair,
-        Robot::Arm,
-        Robot::ServoAxis,
-        Robot::CartPole,
-    ] {
+    let rigs = Robot::ALL.into_iter();
+    for robot in rigs.filter(|robot| !robot.rig_effects().is_empty()) {
         for experiment in Experiment::ALL {
             let log = record(robot, &[], experiment, 3).unwrap();
             let n = log.exact.n_measured();
@@ -227,8 +353,11 @@ fn nothing_runs_away() {
                 let range = match *name {
                     "position_m" => [-0.5, 0.5],
                     "level_upper_m" | "level_lower_m" => [0.0, 1.0],
-                    "angle_rad" => [-1.5, 1.5],
+                    "angle_rad" => [-1.57, 1.57],
+                    "pendulum_angle_rad" => [-3.0, 3.0],
                     "control_voltage_V" => [-9.9, 9.9],
+                    "motor_speed_rad_per_s" | "load_speed_rad_per_s" => [-35.0, 35.0],
+                    "heater_K" | "body_K" => [294.9, 420.0],
                     _ => [-20.0, 20.0],
                 };
                 assert!(

@@ -68,8 +68,8 @@ fn find(id: &str) -> Result<&'static PlantMeta> {
     Err(Error::request(message))
 }
 
-/// The plant with the values of its own example, and what is measured on it: what a velocity
-/// controller acts on, or else all states.
+/// The plant with the values of its own example, and what is measured on it: what a velocity controller acts on,
+/// and the states that move it, such as the angle at which gravity pulls; or else all states.
 fn example(meta: &'static PlantMeta) -> Result<(Model, Vec<&'static Signal>)> {
     let (model, _) = Model::from_toml(&format!("the example of `{}`", meta.id), meta.example)?;
     let missing = model.missing_values();
@@ -83,9 +83,24 @@ fn example(meta: &'static PlantMeta) -> Result<(Model, Vec<&'static Signal>)> {
     let measured = if meta.controlled.is_empty() {
         meta.states.iter().collect()
     } else {
-        meta.controlled.iter().map(|i| &meta.states[*i]).collect()
+        let moves = |i: usize| meta.controlled.contains(&i) || moves_controlled(&model, i);
+        let states = meta.states.iter().enumerate();
+        states.filter(|(i, _)| moves(*i)).map(|(_, s)| s).collect()
     };
     Ok((model, measured))
+}
+
+/// Whether the rate of a controlled state depends on the state `i`, away from rest, where products count as well.
+fn moves_controlled(model: &Model, i: usize) -> bool {
+    let meta = model.plant;
+    let sizes = |signals: &[Signal]| signals.iter().map(|s| s.size).collect::<Vec<f64>>();
+    let (values, efforts) = (model.values(), vec![0.0; model.n_efforts()]);
+    let (mut x, u) = (sizes(meta.states), sizes(meta.inputs));
+    let rates = |x: &[f64]| model.rates_at(&values, x, &u, &efforts);
+    let before = rates(&x);
+    x[i] *= 0.5;
+    let after = rates(&x);
+    meta.controlled.iter().any(|c| before[*c] != after[*c])
 }
 
 fn simulate(model: &Model, text: &str, meta: &PlantMeta) -> Result<Run> {
