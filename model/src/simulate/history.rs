@@ -126,8 +126,9 @@ impl<S: HostReal> History<S> {
         self.at(time).1
     }
 
-    /// Integral and value at `time`, at an entry from the side before it: what a delay of zero is
-    /// differentiated to. A history for effects that look ahead takes the side after it. Before the first and after the last entry the signal is constant.
+    /// Integral and value at `time`. At an entry the value is that from the side before it, to which a delay of
+    /// zero is differentiated; a history for effects that look ahead takes the side after it. Before the first and after
+    /// the last entry the signal is constant.
     fn at(&self, time: S) -> (S, S) {
         let n = self.entries.len();
         if n == 0 {
