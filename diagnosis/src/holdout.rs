@@ -149,15 +149,16 @@ impl<'a> Holdout<'a> {
             try_follow(&mut simulator, x0.as_slice(), run, |k, predicted, _| {
                 let loss: f64 = (0..n)
                     .map(|i| {
-                        let e = (run.sample(k)[i] - predicted[i]) / std[i];
+                        let (measured, predicted) = (run.sample(k)[i], predicted[i]);
+                        let e = (measured - predicted) / std[i];
                         // A missing sample, or a signal that never moves, counts nothing; a run that diverges
                         // to no number at all is as wrong as can be.
-                        match (e.is_nan(), predicted[i].is_nan()) {
-                            (false, _) => e * e,
-                            (true, diverged) => {
-                                let judged = diverged && run.sample(k)[i].is_finite();
-                                if judged { f64::INFINITY } else { 0.0 }
-                            }
+                        if !e.is_nan() {
+                            e * e
+                        } else if predicted.is_nan() && measured.is_finite() {
+                            f64::INFINITY
+                        } else {
+                            0.0
                         }
                     })
                     .sum();

@@ -7,6 +7,7 @@ use loopsight_model::model::Model as Composed;
 
 use crate::answers::{CheckAnswer, Checked, FileKind, LogFault, Mistake};
 use crate::error::Result;
+use crate::files::is_toml;
 use crate::log::Log;
 use crate::run::Loop;
 use crate::session::map;
@@ -27,8 +28,7 @@ pub fn check<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> CheckAnswer 
 
 fn one(path: &Path) -> Checked {
     let file = path.display().to_string();
-    let is_toml = path.extension().is_some_and(|e| e == "toml");
-    let found = if is_toml { toml(path) } else { log(path) };
+    let found = if is_toml(path) { toml(path) } else { log(path) };
     found.unwrap_or_else(|error| Checked {
         right: false,
         mistake: Some(Mistake::new(error.clone())),

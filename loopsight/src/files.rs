@@ -12,6 +12,11 @@ use crate::error::Result;
 pub(crate) use output::apart;
 pub(crate) use output::{check, distinct};
 
+/// Whether a file is one of TOML by its name.
+pub(crate) fn is_toml(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e == "toml")
+}
+
 /// Writes a text, whole or not at all.
 pub(crate) fn save(path: &Path, text: &str) -> Result<Written> {
     Ok(output::save(path, text.as_bytes())?)

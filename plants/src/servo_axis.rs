@@ -1,6 +1,7 @@
 //! A slide that follows a position.
 
 use crate::declare_plant;
+use crate::places::at;
 use loopsight_core::{
     Channel, Derived, Parameter, Place, Plant, PlantMeta, Reads, Real, Role, Signal,
 };
@@ -112,16 +113,7 @@ const fn sensor(
     equation: &'static str,
     doc: &'static str,
 ) -> Channel {
-    Channel {
-        id,
-        place: Place::Output(index),
-        unit,
-        equation,
-        reads: &SLIDE,
-        side: 0,
-        size: 1.0,
-        doc,
-    }
+    at(Place::Output(index), [id, unit, equation, doc], &SLIDE)
 }
 
 const CHANNELS: [Channel; 8] = [

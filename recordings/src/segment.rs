@@ -11,9 +11,9 @@ pub(crate) const NEW_RUN_PERIODS: f64 = 10.0;
 pub(crate) const GAP_PERIODS: f64 = 10.0;
 /// See [`GAP_PERIODS`]; s.
 pub(crate) const GAP_TIME: f64 = 0.5;
-/// Least length of the parts on either side of a gap that is shorter than [`GAP_TIME`]: nothing is left out because of
-/// it; s.
-const PART_TIME: f64 = 1.0;
+/// Runs shorter than this, s, are left out. Nothing is left out because of a gap that is shorter than [`GAP_TIME`]: the
+/// parts on either side of it are no shorter.
+pub(crate) const SHORT_RUN: f64 = 1.0;
 /// Correlation of an input with itself across a gap, below which what it was before says less about it than its
 /// mean does: `1 - ρ` of its variance is unknown at the end of the gap, more than half.
 const FORGOTTEN: f64 = 0.5;
@@ -96,7 +96,7 @@ pub(crate) fn segment(times: &[(usize, f64)], inputs: &Inputs<'_>) -> Segments {
             let mut lost = || {
                 let rows = (step / period) as usize;
                 step > GAP_PERIODS * period
-                    && (last - origin).min(end - time) >= PART_TIME
+                    && (last - origin).min(end - time) >= SHORT_RUN
                     && *forgotten
                         .entry(rows)
                         .or_insert_with(|| inputs.forgotten(rows))

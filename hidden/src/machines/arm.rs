@@ -119,10 +119,7 @@ impl Rig for Arm {
         self.voltage = command;
         let angle = self.state[1];
         let [counted, exact] = self.counter.speed(angle);
-        let mut row = Row {
-            inputs: [command, 0.0],
-            ..Row::default()
-        };
+        let mut row = Row::told(command);
         row.measured[..2].copy_from_slice(&[counted, self.counter.encoder.read(angle)]);
         row.exact[..2].copy_from_slice(&[exact, angle]);
         row

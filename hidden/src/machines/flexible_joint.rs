@@ -121,10 +121,7 @@ impl FlexibleJoint {
 impl Rig for FlexibleJoint {
     fn sample(&mut self, command: f64) -> Row {
         self.torque = command;
-        let mut row = Row {
-            inputs: [command, 0.0],
-            ..Row::default()
-        };
+        let mut row = Row::told(command);
         for i in 0..2 {
             [row.measured[i], row.exact[i]] = self.counters[i].speed(self.state[2 + i]);
         }

@@ -76,6 +76,16 @@ pub(crate) struct Row {
     pub(crate) exact: [f64; SIGNALS],
 }
 
+impl Row {
+    /// That of a machine with one command, before its sensors are read.
+    fn told(command: f64) -> Self {
+        Self {
+            inputs: [command, 0.0],
+            ..Self::default()
+        }
+    }
+}
+
 /// A machine at work.
 pub(crate) trait Rig {
     /// Reads the sensors and takes the command for the time up to the next sample.

@@ -94,10 +94,7 @@ impl Oscillator {
 impl Rig for Oscillator {
     fn sample(&mut self, command: f64) -> Row {
         self.force = command;
-        let mut row = Row {
-            inputs: [command, 0.0],
-            ..Row::default()
-        };
+        let mut row = Row::told(command);
         row.exact[0] = self.state[0];
         row.measured[0] = self.sensor.read(self.state[0]);
         row

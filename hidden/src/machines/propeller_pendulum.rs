@@ -131,10 +131,7 @@ impl PropellerPendulum {
 impl Rig for PropellerPendulum {
     fn sample(&mut self, command: f64) -> Row {
         self.voltage = command;
-        let mut row = Row {
-            inputs: [command, 0.0],
-            ..Row::default()
-        };
+        let mut row = Row::told(command);
         row.exact[0] = self.state[1];
         row.measured[0] = self.encoder.read(self.state[1]);
         row

@@ -139,10 +139,7 @@ impl RotaryPendulum {
 impl Rig for RotaryPendulum {
     fn sample(&mut self, command: f64) -> Row {
         self.torque = command;
-        let mut row = Row {
-            inputs: [command, 0.0],
-            ..Row::default()
-        };
+        let mut row = Row::told(command);
         [row.measured[0], row.exact[0]] = self.counters[0].speed(self.state[2]);
         row.exact[1] = self.state[3];
         row.measured[1] = self.counters[1].encoder.read(self.state[3]);

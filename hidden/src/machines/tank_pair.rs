@@ -105,10 +105,7 @@ impl TankPair {
 impl Rig for TankPair {
     fn sample(&mut self, command: f64) -> Row {
         self.voltage = command;
-        let mut row = Row {
-            inputs: [command, 0.0],
-            ..Row::default()
-        };
+        let mut row = Row::told(command);
         for i in 0..2 {
             row.exact[i] = self.level(i);
             row.measured[i] = self.sensors[i].read(self.level(i));

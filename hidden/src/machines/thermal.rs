@@ -95,10 +95,7 @@ impl Thermal {
 impl Rig for Thermal {
     fn sample(&mut self, command: f64) -> Row {
         self.command = command;
-        let mut row = Row {
-            inputs: [command, 0.0],
-            ..Row::default()
-        };
+        let mut row = Row::told(command);
         for (i, warmer) in self.warmer(self.heat).into_iter().enumerate() {
             row.exact[i] = ROOM + warmer;
             row.measured[i] = self.thermometers[i].read(ROOM + warmer);

@@ -97,10 +97,7 @@ impl TorqueAxis {
 impl Rig for TorqueAxis {
     fn sample(&mut self, command: f64) -> Row {
         self.current = command;
-        let mut row = Row {
-            inputs: [command, 0.0],
-            ..Row::default()
-        };
+        let mut row = Row::told(command);
         [row.measured[0], row.exact[0]] = self.counter.speed(self.state[1]);
         row
     }

@@ -47,7 +47,7 @@ pub(crate) fn session<'p>(
             let model = model_file(model, log)?;
             Session::new(model, read(log)?)?
         }
-        [log] if log.extension().is_some_and(|e| e == "toml") => {
+        [log] if files::is_toml(log) => {
             return Err(Error::request(format!(
                 "{} is a model file; a log is missing: expected MODEL LOG",
                 log.display()
@@ -67,13 +67,12 @@ pub(crate) fn session<'p>(
 
 /// The model in a file that stands before a log; another log there is said to be one.
 fn model_file(path: &Path, log: &Path) -> Result<Model> {
-    let is_toml = |path: &Path| path.extension().is_some_and(|e| e == "toml");
     let model = Model::from_file(path);
-    if model.is_ok() || is_toml(path) || Log::read(path).is_err() {
+    if model.is_ok() || files::is_toml(path) || Log::read(path).is_err() {
         return model;
     }
     let (first, second) = (path.display(), log.display());
-    let help = match is_toml(log) {
+    let help = match files::is_toml(log) {
         true => "the model file comes first".to_owned(),
         false => format!(
             "`fit`, `diagnose` and `improve` take a further recording of the same machine as `--also {second}`"

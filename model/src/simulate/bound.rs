@@ -25,6 +25,13 @@ pub(crate) struct Bound {
     pub(crate) ahead: f64,
 }
 
+impl Bound {
+    /// Whether the effect knows its input already, where so many samples of a run are `foreseen`.
+    pub(super) fn knows_ahead(&self, foreseen: usize) -> bool {
+        foreseen > 0 && self.ahead > 0.0
+    }
+}
+
 /// All effects of a model by the kind of place they act at, in the model's order. On inputs the laws of an
 /// actuator's output come last.
 #[derive(Clone, Debug, Default)]

@@ -7,7 +7,6 @@ use crate::run::Run;
 use loopsight_core::Place;
 
 use super::Simulator;
-use super::bound::Bound;
 use super::history::{Between, CAPACITY, History};
 
 /// The history of an input for an effect that looks ahead: a staircase, or straight lines.
@@ -64,10 +63,5 @@ impl<S: HostReal> Simulator<'_, S> {
             next += 1;
         }
         self.foreseen = next;
-    }
-
-    /// Whether an effect knows its input already.
-    pub(super) fn foresees(&self, bound: &Bound) -> bool {
-        self.foreseen > 0 && bound.ahead > 0.0
     }
 }

@@ -307,7 +307,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         for bound in &self.bounds.input_memory {
             if let (Some(history), Place::Input(i)) = (bound.history, bound.place)
                 && self.slopes[i] == 0.0
-                && !self.foresees(bound)
+                && !bound.knows_ahead(self.foreseen)
             {
                 self.histories[history].hold(self.time, S::of(input[i]));
             }

@@ -45,14 +45,15 @@ pub(super) fn ramped<S: HostReal>(inputs: &mut [S], bounds: &Bounds, slopes: &[f
 }
 
 /// Remembers the inputs that effects with memory look back on as their means over the step `h` from
-/// `from` on, and leaves these means in `held`: a ramp becomes steps there. What is `foreseen` is remembered already.
+/// `from` on, and leaves these means in `held`: a ramp becomes steps there. An effect that
+/// knows its input ahead, where so many samples are `foreseen`, remembers it already.
 pub(super) fn hold_means<S: HostReal>(
     bounds: &Bounds,
     histories: &mut [History<S>],
     held: &mut [S],
     slopes: &[f64],
     (from, h): (f64, f64),
-    foreseen: bool,
+    foreseen: usize,
 ) {
     for (i, (value, slope)) in held.iter_mut().zip(slopes).enumerate() {
         if *slope == 0.0 {
@@ -61,7 +62,7 @@ pub(super) fn hold_means<S: HostReal>(
         let mean = *value + S::of(0.5 * slope * h);
         for bound in &bounds.input_memory {
             if let (Some(history), true) = (bound.history, bound.place == Place::Input(i)) {
-                if !(foreseen && bound.ahead > 0.0) {
+                if !bound.knows_ahead(foreseen) {
                     histories[history].hold(from, mean);
                 }
                 *value = mean;

@@ -39,7 +39,7 @@ impl<S: HostReal> Simulator<'_, S> {
                 &mut scratch.held,
                 slopes,
                 (from, h),
-                *foreseen > 0,
+                *foreseen,
             );
         }
         for bound in &bounds.input_memory {

@@ -4,9 +4,7 @@ use loopsight_model::run::Run;
 
 use crate::fault::{Fault, FaultKind};
 use crate::faults;
-
-/// Runs shorter than this, s, are left out.
-const SHORT_RUN: f64 = 1.0;
+use crate::segment::SHORT_RUN;
 
 /// Leaves out the short runs where the others are enough.
 pub(super) fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
