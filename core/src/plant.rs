@@ -170,6 +170,10 @@ pub trait Plant: PlantArrays + Sized + Send + Sync + 'static {
     /// Parts that a recording may not show, and what their parameters are then.
     const UNSHOWN: &'static [Unshown] = &[];
 
+    /// States that only record where the machine went, by index: no rate and no output depends on them.
+    /// [`Plant::motion`] does without them.
+    const TRAIL: &'static [usize] = &[];
+
     /// Longest integration step where a model file gives none, s: a quarter of the fastest time
     /// constant that is usual, or less.
     const MAX_STEP_S: f64 = MAX_STEP_S;
@@ -181,6 +185,16 @@ pub trait Plant: PlantArrays + Sized + Send + Sync + 'static {
         w: &Self::Effort<S>,
         p: &Self::Parameters<S>,
     ) -> Self::State<S>;
+
+    /// As [`Plant::derivative`], with rates of zero for the [`Plant::TRAIL`]: for simulations of which nobody reads it.
+    fn motion<S: Real>(
+        x: &Self::State<S>,
+        u: &Self::Input<S>,
+        w: &Self::Effort<S>,
+        p: &Self::Parameters<S>,
+    ) -> Self::State<S> {
+        Self::derivative(x, u, w, p)
+    }
 
     /// The `index`-th of [`PlantMeta::outputs`]; one at a time, since most are not needed.
     fn output<S: Real>(
@@ -236,6 +250,18 @@ pub trait Dynamics<S: Real>: Send + Sync {
     /// One step `h` (s) of the plant alone with constant inputs and efforts. The result is exactly that of
     /// [`Rk4`](crate::Rk4) with [`Dynamics::derivative`], but without a call per stage.
     fn step(&self, x: &mut [S], h: S, u: &[S], w: &[S], p: &[S]);
+    /// See [`Plant::TRAIL`].
+    fn trail(&self) -> &'static [usize] {
+        &[]
+    }
+    /// As [`Dynamics::derivative`], with rates of zero for the [trail](Dynamics::trail).
+    fn motion(&self, x: &[S], u: &[S], w: &[S], p: &[S], dx: &mut [S]) {
+        self.derivative(x, u, w, p, dx);
+    }
+    /// As [`Dynamics::step`], of the [motion](Dynamics::motion).
+    fn step_motion(&self, x: &mut [S], h: S, u: &[S], w: &[S], p: &[S]) {
+        self.step(x, h, u, w, p);
+    }
     /// `h_index(x, u; p)`; zero for slices of other lengths.
     fn output(&self, index: usize, x: &[S], u: &[S], p: &[S]) -> S;
     /// Parameters of the equations from the values the file gives (set 0 is the equations' own,
@@ -313,6 +339,37 @@ macro_rules! declare_plant {
                     return;
                 };
                 $crate::rk4_step(x, h, |x| <$plant as $crate::Plant>::derivative::<S>(x, u, w, p));
+            }
+            fn trail(&self) -> &'static [usize] {
+                <$plant as $crate::Plant>::TRAIL
+            }
+            fn motion(&self, x: &[S], u: &[S], w: &[S], p: &[S], dx: &mut [S]) {
+                if <$plant as $crate::Plant>::TRAIL.is_empty() {
+                    return $crate::Dynamics::derivative(self, x, u, w, p, dx);
+                }
+                let (Ok(x), Ok(u), Ok(w), Ok(p)) =
+                    (x.try_into(), u.try_into(), w.try_into(), p.try_into())
+                else {
+                    return;
+                };
+                let rate = <$plant as $crate::Plant>::motion::<S>(x, u, w, p);
+                for (to, from) in dx.iter_mut().zip(rate) {
+                    *to = from;
+                }
+            }
+            fn step_motion(&self, x: &mut [S], h: S, u: &[S], w: &[S], p: &[S]) {
+                if <$plant as $crate::Plant>::TRAIL.is_empty() {
+                    return $crate::Dynamics::step(self, x, h, u, w, p);
+                }
+                let (Some(x), Ok(u), Ok(w), Ok(p)) = (
+                    <<$plant as $crate::PlantArrays>::State<S> as $crate::Array<S>>::from_mut_slice(x),
+                    u.try_into(),
+                    w.try_into(),
+                    p.try_into(),
+                ) else {
+                    return;
+                };
+                $crate::rk4_step(x, h, |x| <$plant as $crate::Plant>::motion::<S>(x, u, w, p));
             }
             fn output(&self, index: usize, x: &[S], u: &[S], p: &[S]) -> S {
                 let (Ok(x), Ok(u), Ok(p)) = (x.try_into(), u.try_into(), p.try_into()) else {

@@ -134,19 +134,30 @@ impl Plant for Ddmr {
 
     const UNSHOWN: &'static [Unshown] = &UNSHOWN;
 
+    /// The place in the plane.
+    const TRAIL: &'static [usize] = &[4, 5];
+
     fn derivative<S: Real>(x: &[S; 6], u: &[S; 2], w: &[S; 4], p: &[S; 8]) -> [S; 6] {
-        let [v, omega, heading, _, _, _] = *x;
+        let mut rate = Self::motion(x, u, w, p);
+        let [v, _, heading, ..] = *x;
+        let (sin, cos) = heading.sin_cos();
+        rate[4] = v * cos;
+        rate[5] = v * sin;
+        rate
+    }
+
+    fn motion<S: Real>(x: &[S; 6], u: &[S; 2], w: &[S; 4], p: &[S; 8]) -> [S; 6] {
+        let [v, omega, ..] = *x;
         let [k_a, k_b, k_c, k_d, k_e, k_f, _, _] = *p;
         let right = u[0] + w[0];
         let left = u[1] + w[1];
-        let (sin, cos) = heading.sin_cos();
         [
             k_a * v + k_b * omega * omega + k_c * (right + left) + w[2],
             k_d * omega + k_e * v * omega + k_f * (right - left) + w[3],
             omega,
             v,
-            v * cos,
-            v * sin,
+            S::zero(),
+            S::zero(),
         ]
     }
 
@@ -341,6 +352,28 @@ mod tests {
             let affine: f64 = f[i] + g[i][0] * u[0] + g[i][1] * u[1] + h[i];
             assert!((affine - rate[i]).abs() < 1e-14);
         }
+    }
+
+    /// Nothing depends on the place in the plane, and the motion without it is the motion with it.
+    #[test]
+    fn the_trail_moves_nothing() {
+        let p = [-15.146, 0.005, 0.136, -9.573, -3.945, 0.656, 0.131, 0.05];
+        let (u, w) = ([5.0, -2.0], [0.3, -0.9, 0.2, -1.1]);
+        let (here, there) = (
+            [0.1, -0.7, 0.4, 2.0, 0.0, 0.0],
+            [0.1, -0.7, 0.4, 2.0, 3.0, -8.0],
+        );
+        let mut rate = Ddmr::derivative(&here, &u, &w, &p);
+        assert_eq!(rate, Ddmr::derivative(&there, &u, &w, &p));
+        for i in 0..OUTPUTS.len() {
+            let at = |x| Ddmr::output(i, x, &u, &p);
+            assert_eq!(at(&here), at(&there));
+        }
+        for i in Ddmr::TRAIL {
+            assert!(rate[*i] != 0.0);
+            rate[*i] = 0.0;
+        }
+        assert_eq!(rate, Ddmr::motion(&here, &u, &w, &p));
     }
 
     #[test]

@@ -12,7 +12,8 @@ pub(crate) struct Bound {
     pub(crate) place: Place,
     side: f64,
     is_position: bool,
-    reads: [Option<usize>; Role::COUNT],
+    /// The roles that are bound, by index, with their signals.
+    reads: Vec<(usize, usize)>,
     /// Signals it reads beside those.
     signals: Vec<usize>,
     /// First of its states in the extended state vector.
@@ -26,6 +27,16 @@ pub(crate) struct Bound {
 }
 
 impl Bound {
+    /// The signals that it reads, the one that it acts on included.
+    fn signals(&self) -> impl Iterator<Item = usize> + '_ {
+        let own = match self.place {
+            Place::Output(i) => Some(i),
+            _ => None,
+        };
+        let named = self.reads.iter().map(|(_, signal)| signal);
+        named.chain(&self.signals).copied().chain(own)
+    }
+
     /// Whether the effect knows its input already, where so many samples of a run are `foreseen`.
     pub(super) fn knows_ahead(&self, foreseen: usize) -> bool {
         foreseen > 0 && self.ahead > 0.0
@@ -65,7 +76,9 @@ impl Bounds {
                     side: f64::from(channel.side),
                     is_position: matches!(channel.place, Place::Output(i)
                         if reads_position(model, channel) == Some(i)),
-                    reads: *reads,
+                    reads: (reads.iter().enumerate())
+                        .filter_map(|(role, signal)| Some((role, (*signal)?)))
+                        .collect(),
                     signals: effect.signals.clone(),
                     z: first + bounds.states,
                     n_z: effect.meta.states,
@@ -115,14 +128,12 @@ impl Bounds {
             .chain(&self.efforts)
             .chain(&self.bodies)
             .chain(&self.outputs)
-            .flat_map(|b| {
-                let own = match b.place {
-                    Place::Output(i) => Some(i),
-                    _ => None,
-                };
-                let named = b.reads.iter().flatten().chain(&b.signals);
-                named.copied().chain(own)
-            })
+            .flat_map(Bound::signals)
+    }
+
+    /// Signals that any effect reads.
+    pub(crate) fn shown(&self) -> impl Iterator<Item = usize> + '_ {
+        self.all().flat_map(Bound::signals)
     }
 }
 
@@ -151,6 +162,10 @@ impl<S: HostReal> Scene<'_, S> {
     }
 
     fn reading<'p>(&'p self, bound: &Bound, nominal: S, past: &'p dyn Past<S>) -> Reading<'p, S> {
+        let mut roles = [None; Role::COUNT];
+        for (role, signal) in &bound.reads {
+            roles[*role] = self.signals.get(*signal);
+        }
         Reading {
             time: self.time,
             from: self.interval.0,
@@ -158,7 +173,7 @@ impl<S: HostReal> Scene<'_, S> {
             nominal,
             side: S::of(bound.side),
             is_position: bound.is_position,
-            roles: bound.reads.map(|read| self.signals.get(read?)),
+            roles,
             signals: self.signals,
             past,
         }

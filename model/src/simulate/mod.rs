@@ -58,7 +58,14 @@ pub struct Simulator<'m, S> {
     before: Vec<S>,
     /// What output effects added to angles then, one per output effect.
     added_before: Vec<S>,
+    /// Looked at within a step.
     needed: Needed,
+    /// Looked at between steps.
+    shown: Needed,
+    /// Whether those are up to date.
+    fresh: bool,
+    /// Whether the plant's trail is simulated, too.
+    trail: bool,
     time: f64,
     interval: f64,
     /// Longest integration step, s.
@@ -74,8 +81,8 @@ pub struct Simulator<'m, S> {
     foreseen: usize,
 }
 
-/// The signals that are looked at within a step, each by its index among its kind. Only these are kept up to
-/// date there: with the rest of them a tenth of a diagnosis went into copies.
+/// Signals that are looked at, each by its index among its kind. Only these are kept up to date: computing and copying
+/// the rest of them took a fifth of a diagnosis.
 #[derive(Clone)]
 struct Needed {
     states: Vec<usize>,
@@ -145,6 +152,8 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             .filter(|s| matches!(s.integral, Integral::State(_)))
             .map(|s| s.index);
         let needed = Needed::of(bounds.read().chain(integrated), nx, nu);
+        let sensed = sensors.iter().flat_map(Sensing::signals);
+        let shown = Needed::of(bounds.shown().chain(sensed), nx, nu);
         // Not cloned from one: a clone of an empty history has no room kept for what is to come.
         let histories = (0..bounds.histories)
             .map(|i| {
@@ -176,6 +185,9 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             before: vec![S::zero(); sensors.len()],
             added_before: vec![S::zero(); bounds.outputs.len()],
             needed,
+            shown,
+            fresh: false,
+            trail: true,
             sensors,
             bounds,
             time: 0.0,
@@ -205,20 +217,37 @@ impl<'m, S: HostReal> Simulator<'m, S> {
 
     /// The plant state, to be corrected.
     pub fn state_mut(&mut self) -> &mut [S] {
+        self.fresh = false;
         let nx = self.model.n_states();
         &mut self.x[..nx]
     }
 
     /// All signals of the plant (states, inputs, outputs) now.
     pub fn signals(&mut self) -> &[S] {
-        self.refresh();
-        &self.scratch.signals
-    }
-
-    fn refresh(&mut self) {
         let nx = self.model.n_states();
         let Scratch { held, signals, .. } = &mut self.scratch;
         self.model.signals_at(&self.p, &self.x[..nx], held, signals);
+        &self.scratch.signals
+    }
+
+    /// Brings the signals that are looked at between steps up to date.
+    fn refresh(&mut self) {
+        if std::mem::replace(&mut self.fresh, true) {
+            return;
+        }
+        let (nx, nu) = (self.model.n_states(), self.model.plant.inputs.len());
+        let Scratch { held, signals, .. } = &mut self.scratch;
+        let x = &self.x[..nx];
+        for i in &self.shown.states {
+            signals[*i] = x[*i];
+        }
+        for i in &self.shown.inputs {
+            signals[nx + i] = held[*i];
+        }
+        let dynamics = S::dynamics(self.model.dynamics);
+        for i in &self.shown.outputs {
+            signals[nx + nu + i] = dynamics.output(*i, x, held, &self.p);
+        }
     }
 
     fn scene(&self) -> Scene<'_, S> {

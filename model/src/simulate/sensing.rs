@@ -18,6 +18,17 @@ pub(super) struct Sensing {
     pub(super) through: Vec<(usize, f64)>,
 }
 
+impl Sensing {
+    /// The signals that it is made from.
+    pub(super) fn signals(&self) -> impl Iterator<Item = usize> {
+        let integral = match self.integral {
+            Integral::Signal(i) => Some(i),
+            Integral::None | Integral::State(_) => None,
+        };
+        std::iter::once(self.index).chain(integral)
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Integral {
     /// Not needed.

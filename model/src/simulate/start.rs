@@ -20,6 +20,7 @@ impl<S: HostReal> Simulator<'_, S> {
         let nx = self.model.n_states();
         self.time = 0.0;
         self.interval = 0.0;
+        self.fresh = false;
         self.foreseen = 0;
         for (to, from) in self.x.iter_mut().zip(x0) {
             *to = *from;

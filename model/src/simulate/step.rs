@@ -12,6 +12,7 @@ use loopsight_core::{NoPast, Place};
 impl<S: HostReal> Simulator<'_, S> {
     /// One integration step, from the inputs in `held`; leaves those at its end there.
     pub(super) fn step(&mut self, from: f64, h: f64) {
+        self.fresh = false;
         let Self {
             model,
             p,
@@ -28,6 +29,7 @@ impl<S: HostReal> Simulator<'_, S> {
             needed,
             slopes,
             foreseen,
+            trail,
             ..
         } = self;
         let model: &Model = model;
@@ -66,7 +68,12 @@ impl<S: HostReal> Simulator<'_, S> {
         let plain = bounds.idle() && x.len() == nx && pushed.rates.is_empty() && !ramping;
         if plain && *way == Way::Explicit {
             // Nothing changes what acts on the plant within the step: half the time.
-            dynamics.step(x, S::of(h), &scratch.held, &scratch.w, p);
+            let (h, held, w) = (S::of(h), &scratch.held, &scratch.w);
+            if *trail {
+                dynamics.step(x, h, held, w, p);
+            } else {
+                dynamics.step_motion(x, h, held, w, p);
+            }
             return;
         }
         let Scratch {
@@ -132,7 +139,12 @@ impl<S: HostReal> Simulator<'_, S> {
                     w[i] += add;
                 }
             }
-            dynamics.derivative(plant_x, u, w, p, &mut dx[..nx]);
+            let dx_of_plant = &mut dx[..nx];
+            if *trail {
+                dynamics.derivative(plant_x, u, w, p, dx_of_plant);
+            } else {
+                dynamics.motion(plant_x, u, w, p, dx_of_plant);
+            }
             for (rate, push) in dx.iter_mut().zip(&pushed.rates) {
                 *rate += *push;
             }

@@ -7,11 +7,27 @@ use loopsight_core::Place;
 use super::Simulator;
 
 impl<S: HostReal> Simulator<'_, S> {
+    /// The same without the plant's [trail](loopsight_core::Dynamics::trail), where neither a sensor nor an effect reads
+    /// it: those states stay as they are. What is measured has the same digits. The x and y of a robot in the plane take a
+    /// sine and a cosine at every stage.
+    #[must_use]
+    pub fn without_trail(mut self) -> Self {
+        let read = |i: &usize| {
+            [&self.needed, &self.shown]
+                .iter()
+                .any(|n| n.states.contains(i))
+        };
+        let trail = S::dynamics(self.model.dynamics).trail();
+        self.trail = trail.iter().any(read);
+        self
+    }
+
     /// Other parameter values from now on (as long as `model.parameters`); the state stays.
     pub fn set_values(&mut self, values: &[S]) {
         let model: &Model = &self.model;
         if values.len() == self.values.len() {
             self.values.copy_from_slice(values);
+            self.fresh = false;
             model.lower_into(&self.values, &mut self.p);
         }
     }
