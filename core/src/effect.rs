@@ -14,6 +14,9 @@ pub enum Shows {
     /// The recording is one run. What changes with time alone does not begin anew with every run, and how long the machine
     /// ran between two of them is not known.
     OneRun,
+    /// The plant has one mass. Where several move, what lies between them is the plant's own, and an observer that corrects
+    /// one of them would be given a second filter.
+    OneMass,
 }
 
 /// What an effect says about itself.

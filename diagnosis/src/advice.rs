@@ -79,6 +79,8 @@ fn separating(a: &str, b: &str) -> String {
         "sensor_window",
     ]) {
         "fast steps and a chirp up to the loop's bandwidth, sampled as fast as the sensor allows; for input against sensor delay, disturb the robot by hand: a disturbance passes the sensor only".to_owned()
+    } else if either(&["elastic_coupling"]) {
+        "a chirp through the frequency at which it rings, small and large, and steps, sampled ten times in each swing: a spring rings at one frequency at any size".to_owned()
     } else if either(&["hysteresis"]) {
         "to and fro over ways of several lengths, from one side and from the other, slowly and again faster: a loop of hysteresis is as wide at any speed, and wider over longer ways".to_owned()
     } else if either(&[

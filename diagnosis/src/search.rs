@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use loopsight_model::run::Run;
 use rayon::prelude::*;
 
 use crate::candidates::Candidate;
@@ -12,7 +11,7 @@ use crate::criteria::{Criteria, SearchCriteria};
 use crate::explain::explain;
 use crate::judge::nrmse;
 use crate::progress::{Stage, Work};
-use crate::starts::{first_starts, fresh_starts, grown_starts};
+use crate::starts::{Extent, first_starts, fresh_starts, grown_starts};
 use crate::trial::{Judged, Nominal, finish, look, promise};
 
 /// A candidate by its index, and where to start it from.
@@ -84,13 +83,12 @@ impl Search<'_> {
 
     /// All that were looked at, by their indices.
     fn looked_at(&self) -> Vec<(usize, Judged)> {
-        let runs = self.nominal.holdout.runs.iter();
-        let duration = runs.map(Run::duration).fold(0.0, f64::max);
+        let extent = Extent::of(self.nominal.holdout.runs);
         let attempts: Vec<Attempt> = (self.all.iter().enumerate())
             .filter(|(_, c)| !c.separate)
             .flat_map(|(i, c)| {
-                let starts = first_starts(c, self.nominal.model, duration);
-                let fresh = fresh_starts(c, self.nominal, duration);
+                let starts = first_starts(c, self.nominal.model, extent);
+                let fresh = fresh_starts(c, self.nominal, extent);
                 starts.into_iter().chain(fresh).map(move |start| (i, start))
             })
             .collect();
@@ -104,7 +102,7 @@ impl Search<'_> {
         // A candidate that contains another one comes after it, and starts from where that one ended. Where that
         // one failed, it starts from its own best start.
         while !self.work.is_cancelled() {
-            let mut next = self.grown(&looked, &tried, &mut waiting, duration);
+            let mut next = self.grown(&looked, &tried, &mut waiting, extent);
             next.append(&mut waiting);
             if next.is_empty() {
                 break;
@@ -190,7 +188,7 @@ impl Search<'_> {
         looked: &[(usize, Judged)],
         tried: &BTreeSet<usize>,
         waiting: &mut Vec<Attempt>,
-        duration: f64,
+        extent: Extent,
     ) -> Vec<Attempt> {
         let criteria = self.criteria();
         let least_of_all = least(looked.iter().map(|(_, found)| found));
@@ -208,7 +206,7 @@ impl Search<'_> {
             });
             let elsewhere = error > criteria.elsewhere * least(places);
             let divided = error < criteria.worth_dividing * nrmse(self.nominal.rank);
-            let starts = grown_starts(candidate, simpler, duration);
+            let starts = grown_starts(candidate, simpler, extent);
             let worth = error < criteria.worth_growing * least_of_all
                 && (!candidate.separate || divided)
                 && starts.len() <= criteria.grown_starts;

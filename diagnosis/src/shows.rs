@@ -26,8 +26,15 @@ pub(crate) fn can_show(
                 && channels.all(|c| never_negative(model, c, runs, criteria.negative))
         }
         Shows::OneRun => runs.len() == 1,
+        Shows::OneMass => masses(model) == 1,
         Shows::InputAtZero => channels.any(|c| rests(c, runs, criteria.rests_s)),
     }
+}
+
+/// The rates of a plant at which inertia acts.
+fn masses(model: &Model) -> usize {
+    let rates = model.plant.channels.iter();
+    rates.filter(|c| matches!(c.place, Place::Rate(_))).count()
 }
 
 /// Whether an input has values of both signs.
@@ -153,6 +160,27 @@ mod tests {
         let two = [Run::empty(1, 1), Run::empty(1, 1)];
         let criteria = SearchCriteria::DEFAULT;
         assert!(!can_show(&axis, &meta, &["input"], &two, &criteria));
+    }
+
+    /// A cart and its pole are two.
+    #[test]
+    fn a_mass_is_divided_where_there_is_one() {
+        assert!(shows(Shows::OneMass, "inertia", |_| 1.0, |_| 0.0));
+        let text = "[plant.flexible_joint]\n[log.measured]\nmotor_speed = { sensor = \"instantaneous\" }\n";
+        let (joint, _) = Model::from_toml("joint.toml", text).unwrap();
+        let meta = EffectMeta {
+            shows: Shows::OneMass,
+            ..EffectMeta::PLAIN
+        };
+        let runs = [Run::empty(1, 1)];
+        let criteria = SearchCriteria::DEFAULT;
+        assert!(!can_show(
+            &joint,
+            &meta,
+            &["inertia.motor"],
+            &runs,
+            &criteria
+        ));
     }
 
     #[test]

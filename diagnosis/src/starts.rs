@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use loopsight_core::{Channel, Place, Shows};
-use loopsight_model::model::Model;
+use loopsight_model::model::{Model, ModelParameter};
 use loopsight_model::run::Run;
 
 use crate::candidates::{Candidate, is_per_way};
@@ -16,9 +16,42 @@ use crate::unfold::unfolded;
 /// Starting values of a speed that is estimated, as shares of the flow.
 const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
 
+/// What a recording can show in time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extent {
+    /// Of the longest run, s.
+    duration: f64,
+    /// Half the rate of the samples as an angular frequency, rad/s: what swings faster shows as something slower.
+    fastest: f64,
+}
+
+impl Extent {
+    pub(crate) fn of(runs: &[Run]) -> Self {
+        let longest = runs.iter().map(Run::duration).fold(0.0, f64::max);
+        let periods = runs.iter().map(Run::median_period);
+        Self {
+            duration: longest,
+            fastest: std::f64::consts::PI / periods.fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// The values that a parameter lists to start from, frequencies beyond the recording left out.
+    fn starts(self, parameter: &ModelParameter) -> Vec<f64> {
+        let mut listed = parameter.starts(self.duration);
+        if parameter.declaration.unit == "rad/s" {
+            listed.retain(|frequency| *frequency < self.fastest);
+        }
+        listed
+    }
+}
+
 /// Starting values of a candidate: those of the `nominal` model. Where the candidate replaces an effect, parameters
 /// of the same name start at that effect's values.
-pub(crate) fn first_starts(candidate: &Candidate, nominal: &Model, duration: f64) -> Vec<Vec<f64>> {
+pub(crate) fn first_starts(
+    candidate: &Candidate,
+    nominal: &Model,
+    extent: Extent,
+) -> Vec<Vec<f64>> {
     let mut base = nominal.values();
     let mut known = BTreeMap::new();
     if let Some((_, gone)) = &candidate.replaces {
@@ -29,7 +62,7 @@ pub(crate) fn first_starts(candidate: &Candidate, nominal: &Model, duration: f64
         }
         base.drain(gone.clone());
     }
-    starts(candidate, &base, &known, duration)
+    starts(candidate, &base, &known, extent)
 }
 
 /// Starting values of a candidate that has nothing to do with what the plain model was fitted to, where that fit got
@@ -38,7 +71,7 @@ pub(crate) fn first_starts(candidate: &Candidate, nominal: &Model, duration: f64
 pub(crate) fn fresh_starts(
     candidate: &Candidate,
     nominal: &Nominal<'_>,
-    duration: f64,
+    extent: Extent,
 ) -> Vec<Vec<f64>> {
     let lost = nrmse(nominal.rank) > nominal.work.criteria().start.lost;
     if candidate.meta.shows != Shows::NeverNegative || !lost {
@@ -54,7 +87,7 @@ pub(crate) fn fresh_starts(
         bases.extend(fitted_to(given, &runs, nominal));
     }
     let known = BTreeMap::new();
-    let of = |base: &Vec<f64>| starts(candidate, base, &known, duration);
+    let of = |base: &Vec<f64>| starts(candidate, base, &known, extent);
     bases.iter().flat_map(of).collect()
 }
 
@@ -81,7 +114,7 @@ fn measured_at(model: &Model, at: &[&str]) -> Vec<usize> {
 pub(crate) fn grown_starts(
     candidate: &Candidate,
     simpler: &Judged,
-    duration: f64,
+    extent: Extent,
 ) -> Vec<Vec<f64>> {
     let own = simpler.candidate.own();
     let values = &simpler.solution.values;
@@ -90,16 +123,16 @@ pub(crate) fn grown_starts(
         .map(|declaration| declaration.id)
         .zip(values[own.clone()].iter().copied())
         .collect();
-    starts(candidate, &values[..own.start], &known, duration)
+    starts(candidate, &values[..own.start], &known, extent)
 }
 
 /// Starting values of a candidate: `base` for the rest of the model, `known` for its own parameters, and a
-/// noticeable size where these are not known.
+/// noticeable size where these are not known. None where the recording is too slow for all that it lists.
 fn starts(
     candidate: &Candidate,
     base: &[f64],
     known: &BTreeMap<&str, f64>,
-    duration: f64,
+    extent: Extent,
 ) -> Vec<Vec<f64>> {
     let mut all = vec![base.to_vec()];
     let regressed = candidate.shape().is_some();
@@ -107,7 +140,10 @@ fn starts(
         let parameter = &candidate.model.parameters[i];
         let nearest = |value: f64| parameter.declaration.nearest(value);
         let neutral = parameter.value.unwrap_or(0.0);
-        let listed = parameter.starts(duration);
+        let listed = extent.starts(parameter);
+        if listed.is_empty() && !parameter.declaration.starts.is_empty() {
+            return Vec::new();
+        }
         let values: Vec<f64> = if let Some(value) = known.get(parameter.declaration.id) {
             vec![*value]
         } else if !parameter.free && listed.is_empty() {

@@ -32,6 +32,38 @@ impl Gap {
     }
 }
 
+/// A shaft that twists, with a load behind it.
+///
+/// ```text
+/// T = stiffness δ + damping δ'     δ = φ_near - φ_far     inertia φ''_far = T
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Twisting {
+    /// Of the load, kg m².
+    pub(crate) inertia: f64,
+    /// N m/rad
+    pub(crate) stiffness: f64,
+    /// N m s/rad
+    pub(crate) damping: f64,
+}
+
+impl Twisting {
+    /// Torque that reaches the load for a twist and its rate, N m.
+    pub(crate) fn torque(&self, twist: f64, rate: f64) -> f64 {
+        self.stiffness * twist + self.damping * rate
+    }
+
+    /// The shaft to a load of this inertia, which swings with `frequency` rad/s and the damping ratio `ratio` while its
+    /// near end is held.
+    pub(crate) fn swinging(inertia: f64, frequency: f64, ratio: f64) -> Self {
+        Self {
+            inertia,
+            stiffness: inertia * frequency * frequency,
+            damping: 2.0 * ratio * inertia * frequency,
+        }
+    }
+}
+
 /// A tyre on the ground: a force that grows with slip, has a peak and falls to sliding.
 ///
 /// ```text

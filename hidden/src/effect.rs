@@ -80,6 +80,7 @@ effects! {
     BatterySag "battery_sag" Twil "a battery with internal resistance",
     WindingHeating "winding_heating" Twil "windings that grow warm and resistive",
     PayloadChange "payload_change" Twil "a load put on board while driving",
+    ElasticCoupling "elastic_coupling" Axis "a part of the inertia behind a long shaft; the encoder sits at the motor",
     SensorDelay "sensor_delay" Twil "odometry that is read late",
     SensorLag "sensor_lag" Twil "odometry from filtered counts",
     SensorOffset "sensor_offset" Twil "a bias on the measured yaw rate",

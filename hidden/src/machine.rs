@@ -18,6 +18,8 @@ struct Velocities {
     wheel: [f64; 2],
     /// Gear outputs on the motor's side, when there is play, rad/s.
     rotor: [f64; 2],
+    /// A load behind a shaft that twists, rad/s.
+    far: f64,
 }
 
 /// The places of dry friction: both shafts and the yaw axis.
@@ -73,6 +75,8 @@ pub(crate) struct Machine {
     angles: [f64; 2],
     wheel_angles: [f64; 2],
     rotor_angles: [f64; 2],
+    /// How far the load behind a twisting shaft is behind, rad.
+    twist: f64,
     /// `x`, `y`, heading.
     pose: [f64; 3],
     impulses: [f64; 3],
@@ -101,6 +105,7 @@ impl Machine {
             angles: [0.0; 2],
             wheel_angles: [0.0; 2],
             rotor_angles: [0.0; 2],
+            twist: 0.0,
             pose: [0.0; 3],
             impulses: [0.0; 3],
             dry,
@@ -246,6 +251,12 @@ impl Machine {
             if physics.robot == Driven::Axis {
                 torque += physics.load.torque(wheel_angle);
                 torque -= physics.joint.moved(0.5 * STEP * wheel).force;
+                if let Some(shaft) = physics.twisting {
+                    let rate = wheel - middle.far;
+                    let through = shaft.torque(self.twist + 0.5 * STEP * rate, rate);
+                    end.far += STEP * through / shaft.inertia;
+                    torque -= through;
+                }
             }
             if let Some(tyre) = physics.tyre {
                 let r = physics.body.wheel_radius;
@@ -324,6 +335,7 @@ impl Machine {
             self.wheel_angles[k] += STEP * wheel;
             if k == 0 {
                 self.physics.joint = self.physics.joint.moved(STEP * wheel);
+                self.twist += STEP * (wheel - mean.far);
             }
             self.rotor_angles[k] += STEP * mean.rotor[k];
         }
@@ -386,6 +398,7 @@ impl Velocities {
             body: half(self.body, other.body),
             wheel: half(self.wheel, other.wheel),
             rotor: half(self.rotor, other.rotor),
+            far: 0.5 * (self.far + other.far),
         }
     }
 }

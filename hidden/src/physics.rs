@@ -1,7 +1,7 @@
 //! Everything a machine is made of, effects included.
 
 use crate::amplifier::AmplifierParts;
-use crate::contact::{Gap, Tyre};
+use crate::contact::{Gap, Twisting, Tyre};
 use crate::driven::{Body, Driven, Motor};
 use crate::friction::Friction;
 use crate::hysteresis::Hysteresis;
@@ -83,6 +83,8 @@ pub(crate) struct Physics {
     pub(crate) scrub: f64,
     pub(crate) cogging: [Cogging; 2],
     pub(crate) gap: Option<Gap>,
+    /// Behind the shaft of the axis.
+    pub(crate) twisting: Option<Twisting>,
     pub(crate) tyre: Option<Tyre>,
     pub(crate) load: Load,
     /// Between the shaft of the axis and the ground.
@@ -115,6 +117,7 @@ impl Physics {
             scrub: 0.0,
             cogging: [Cogging::default(); 2],
             gap: None,
+            twisting: None,
             tyre: None,
             load: Load::default(),
             joint: Hysteresis::default(),

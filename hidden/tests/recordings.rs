@@ -259,6 +259,7 @@ fn the_committed_recordings_are_these() {
         (Robot::Twil, Hidden::BridgeCoast),
         (Robot::Axis, Hidden::Hysteresis),
         (Robot::Oscillator, Hidden::Hysteresis),
+        (Robot::Axis, Hidden::ElasticCoupling),
     ] {
         let lesson = robot.lesson(Some(effect));
         record(robot, &[(effect, 1.0)], lesson, 1)

@@ -143,6 +143,12 @@ fn a_joint_with_hysteresis_is_found_with_its_loop() {
     finds(Hidden::Hysteresis, 0.5, 3);
 }
 
+/// Found with the share of the inertia that is behind the spring, and how it swings.
+#[test]
+fn a_load_behind_a_spring_is_found() {
+    finds_under(Experiment::Mixed, Hidden::ElasticCoupling, 0.5, 3);
+}
+
 /// A dead zone of the driver cannot lie behind the terminals of a motor: where the voltages were measured
 /// there, neither it nor anything else that acts before them is looked for.
 #[test]

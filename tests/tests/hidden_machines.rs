@@ -12,6 +12,7 @@ use assert_cmd::Command;
 use loopsight_diagnosis::{FitSettings, Measurements, Work, diagnose, fit};
 use loopsight_hidden::{Experiment, Hidden, Robot, record};
 use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_plants as _;
 use loopsight_tests::repository;
 
@@ -97,6 +98,47 @@ fn a_clean_cart_is_a_cart_pole() {
 #[test]
 fn a_clean_long_shaft_is_a_flexible_joint() {
     explained(Robot::FlexibleJoint);
+}
+
+/// Two masses of which the motor's alone is measured: to the plant of one mass it lacks what makes it two.
+#[test]
+fn an_axis_whose_load_nobody_measures_lacks_the_spring() {
+    let near = |experiment, seed| {
+        let log = record(Robot::FlexibleJoint, &[], experiment, seed)
+            .unwrap()
+            .run;
+        let mut near = Run::empty(1, 1);
+        for k in 0..log.len() {
+            near.push(log.time()[k], log.input(k), &log.sample(k)[..1])
+                .unwrap();
+        }
+        [near]
+    };
+    let text = "[plant.dc_axis]\nK_A = -2.0\nK_C = 40.0\n\
+                [log.measured.speed.sensor.encoder_counts]\ncounts_per_revolution = 8192.0\nof = { angle = 1.0 }\n";
+    let (model, _) = Model::from_toml("axis", text).unwrap();
+    let (log, test) = (near(Experiment::Prbs, 21), near(Experiment::MultiLevel, 22));
+    let found = diagnose(
+        &model,
+        &Measurements::new(&log).tested_on(Some(&test)),
+        &Work::quiet(),
+    )
+    .unwrap();
+    let best = &found.candidates[0];
+    assert_eq!(found.missing.unwrap().effect, "elastic_coupling");
+    // Flywheels of 0.01 and 0.02 kg m² and 8 N m/rad between them. The load has a bearing of its own, which is counted to
+    // the motor here and shifts the ratio; the resonance stays.
+    let [ratio, antiresonance] = ["ratio", "antiresonance"].map(|id| best.parameters[id].value);
+    let resonance = antiresonance * (1.0 + ratio).sqrt();
+    println!(
+        "{:.4} of {:.4}, {ratio} {antiresonance}",
+        best.nrmse, found.nominal.nrmse
+    );
+    assert!(
+        (resonance / f64::sqrt(1200.0) - 1.0).abs() < 0.01,
+        "{resonance} rad/s"
+    );
+    assert!(best.nrmse < 0.2 * found.nominal.nrmse);
 }
 
 #[test]

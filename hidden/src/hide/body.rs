@@ -1,6 +1,6 @@
 //! Effects at the body: ground, centre of mass, payload.
 
-use crate::contact::Tyre;
+use crate::contact::{Twisting, Tyre};
 use crate::driven::Driven;
 use crate::physics::{GRAVITY, Payload, Physics, Slope};
 use crate::truth::Concealed;
@@ -79,6 +79,22 @@ pub(super) fn slip(m: &mut Physics, mut of: Concealed) -> Concealed {
     .physical("largest_traction", traction, "N")
     .physical("sliding_traction", sliding * traction, "N")
     .physical("slip_scale", tyre.slip, "m/s")
+}
+
+/// A third of the axis' inertia behind a shaft on which it swings with 40 rad/s; the encoder sits at the motor.
+pub(super) fn coupling(m: &mut Physics, mut of: Concealed) -> Concealed {
+    let (ratio, frequency, damping) = (0.5 * of.size, 40.0, 0.05);
+    let inertia = effective(m)[0] * ratio / (1.0 + ratio);
+    let shaft = Twisting::swinging(inertia, frequency, damping);
+    m.body.mass -= inertia;
+    m.twisting = Some(shaft);
+    of.at = vec!["inertia"];
+    of.fitted("ratio", ratio, "1")
+        .fitted("antiresonance", frequency, "rad/s")
+        .fitted("damping", damping, "1")
+        .physical("load_inertia", shaft.inertia, "kg m^2")
+        .physical("stiffness", shaft.stiffness, "N m/rad")
+        .physical("damping_torque", shaft.damping, "N m s/rad")
 }
 
 /// Something of 7.2 kg and 0.16 kg m², put on board after 9.7 s.

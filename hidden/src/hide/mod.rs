@@ -51,6 +51,7 @@ pub(crate) fn hide(
         H::CentrifugalOffset => body::offset(machine, concealed),
         H::WheelSlip => body::slip(machine, concealed),
         H::PayloadChange => body::payload(machine, concealed),
+        H::ElasticCoupling => body::coupling(machine, concealed),
         H::DeadZone => input::dead_zone(machine, concealed),
         H::InputSaturation => input::saturation(machine, concealed),
         H::InputPower => input::power(machine, concealed),
@@ -108,6 +109,7 @@ fn fits(effect: Hidden, robot: Driven) -> bool {
         | H::LinearStiffness
         | H::CubicStiffness
         | H::Hysteresis
+        | H::ElasticCoupling
         | H::SensorMagnitude => robot == Driven::Axis,
         H::ScrubFriction
         | H::GravitySlope

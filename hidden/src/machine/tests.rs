@@ -200,6 +200,38 @@ fn a_pendulum_keeps_its_energy_but_for_friction() {
     assert!(worst < 1e-3 * weight, "{worst} J of {weight} J");
 }
 
+/// Coils cut and nothing damped, the two halves swing with `√(k/J_m + k/J_l)`, and keep energy and momentum.
+#[test]
+fn a_shaft_that_twists_swings_between_its_ends() {
+    let mut physics = with(Driven::Axis, Hidden::ElasticCoupling, 1.0);
+    physics.motor.torque_constant = 0.0;
+    physics.motor.back_emf_constant = 0.0;
+    physics.motor.rotor_friction = 0.0;
+    let near = physics.body.mass + physics.motor.reflected_inertia + physics.body.wheel_inertia;
+    let shaft = physics.twisting.as_mut().unwrap();
+    shaft.damping = 0.0;
+    let (far, stiffness) = (shaft.inertia, shaft.stiffness);
+    assert!((far / near - 0.5).abs() < 1e-9);
+    let swing = (stiffness / near + stiffness / far).sqrt();
+    assert!((swing - 40.0 * f64::sqrt(1.5)).abs() < 1e-9);
+    let mut machine = Machine::new(physics);
+    machine.twist = 0.1;
+    let whole = 0.5 * stiffness * 0.01;
+    for k in 1..=20_000 {
+        machine.step([0.0; 2]);
+        let (speed, behind) = (machine.velocities.body[0], machine.velocities.far);
+        let moving = 0.5 * (near * speed * speed + far * behind * behind);
+        let energy = moving + 0.5 * stiffness * machine.twist * machine.twist;
+        assert!(
+            (energy / whole - 1.0).abs() < 2e-3,
+            "{energy} J of {whole} J"
+        );
+        assert!((near * speed + far * behind).abs() < 1e-12);
+        let expected = 0.1 * (swing * f64::from(k) * STEP).cos();
+        assert!((machine.twist - expected).abs() < 5e-4, "{k}");
+    }
+}
+
 #[test]
 fn a_payload_keeps_the_momentum() {
     let mut physics = with(Driven::Twil, Hidden::PayloadChange, 1.0);

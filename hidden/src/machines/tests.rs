@@ -259,6 +259,25 @@ fn a_current_turns_the_joint_against_its_friction() {
     assert!((impulse / full - 1.0).abs() < 0.02, "{impulse} {full}");
 }
 
+/// With a flexible spline the motor's side starts alone, and in the end both turn as one.
+#[test]
+fn a_flexible_spline_carries_the_load_along() {
+    let mut rig = TorqueAxis::new(PHASE);
+    let told = with(&mut rig, Hidden::ElasticCoupling);
+    assert!((told.value("ratio").unwrap() - 1.5).abs() < 1e-12);
+    let (load, near) = (0.03, 0.02);
+    rig.sample(1.0);
+    rig.advance();
+    let [impulse, angle, behind, _] = rig.state;
+    let free = rig.gain() / near * 0.5 * 1e-4;
+    assert!((angle / free - 1.0).abs() < 0.1, "{angle} {free}");
+    assert!((impulse + behind + rig.oil * angle - rig.gain() * 0.01).abs() < 1e-9);
+    hold(&mut rig, 1.0, 3000);
+    let [impulse, _, behind, _] = rig.state;
+    assert!((impulse / near - behind / load).abs() < 1e-6);
+    assert!((rig.oil * impulse / near - rig.gain()).abs() < 1e-5);
+}
+
 /// What is put in is in the bodies or in the room; at rest what goes in goes out.
 #[test]
 fn the_heater_loses_no_heat_but_to_the_room() {

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::{Counter, Rig, Row, Scale, Sheet, dry, midpoint, quantity};
 use crate::Hidden;
+use crate::contact::Twisting;
 use crate::delay::Delay;
 use crate::friction::Friction;
 use crate::truth::{Concealed, Quantity};
@@ -14,7 +15,11 @@ pub(crate) const SHEET: Sheet = Sheet {
     inputs: 1,
     columns: &["time_s", "current_A", "speed_rad_per_s"],
     command: [0.0, 4.0],
-    shows: &[Hidden::CoulombFriction, Hidden::InputDelay],
+    shows: &[
+        Hidden::CoulombFriction,
+        Hidden::InputDelay,
+        Hidden::ElasticCoupling,
+    ],
     build: |phase, _| Box::new(TorqueAxis::new(phase)),
 };
 
@@ -31,6 +36,12 @@ const GEAR: f64 = 10.0;
 /// ```text
 /// (rotor N² + load) ω' = N K_T i - oil ω + friction        N: turns of the motor per turn
 /// ```
+///
+/// With a flexible spline `δ` is what it twists:
+///
+/// ```text
+/// rotor N² ω' = N K_T i - oil ω + friction - T(δ, δ')      load ω'_l = T(δ, δ')      δ' = ω - ω_l
+/// ```
 #[derive(Clone, Debug)]
 pub(super) struct TorqueAxis {
     /// At the joint, kg m².
@@ -42,11 +53,12 @@ pub(super) struct TorqueAxis {
     /// N m/A
     torque_constant: f64,
     seal: Friction,
+    spline: Option<Twisting>,
     counter: Counter,
     late: Delay<f64>,
     current: f64,
-    /// Impulse, N m s, and angle, rad, of the joint.
-    pub(super) state: [f64; 2],
+    /// Impulse, N m s, and angle, rad, of the joint on the motor's side; the same of a load behind a flexible spline.
+    pub(super) state: [f64; 4],
 }
 
 impl TorqueAxis {
@@ -57,15 +69,22 @@ impl TorqueAxis {
             oil: 0.1,
             torque_constant: 0.05,
             seal: Friction::default(),
+            spline: None,
             counter: Counter::new(Scale::new(TAU / GEAR / COUNTS, phase[0]), SHEET.rate),
             late: Delay::new(0, 0.0),
             current: 0.0,
-            state: [0.0; 2],
+            state: [0.0; 4],
         }
     }
 
     pub(super) fn inertia(&self) -> f64 {
         self.load + self.rotor * GEAR * GEAR
+    }
+
+    /// What turns with the motor, kg m².
+    fn near(&self) -> f64 {
+        let behind = self.spline.map_or(0.0, |spline| spline.inertia);
+        self.inertia() - behind
     }
 
     /// Torque at the joint per ampere.
@@ -75,11 +94,17 @@ impl TorqueAxis {
 
     fn step(&mut self) {
         let torque = self.gain() * self.late.push(self.current);
-        let inertia = self.inertia();
+        let inertia = self.near();
         let start = self.state;
-        let mut end = midpoint(start, STEP, |[impulse, _]| {
+        let mut end = midpoint(start, STEP, |[impulse, angle, far, far_angle]| {
             let speed = impulse / inertia;
-            [torque - self.oil * speed, speed]
+            let (through, far_speed) = self.spline.map_or((0.0, 0.0), |spline| {
+                let far_speed = far / spline.inertia;
+                let twist = angle - far_angle;
+                (spline.torque(twist, speed - far_speed), far_speed)
+            });
+            let drive = torque - self.oil * speed;
+            [drive - through, speed, through, far_speed]
         });
         let stop = dry(
             &self.seal,
@@ -125,6 +150,19 @@ impl Rig for TorqueAxis {
                 Some(
                     of.told("a current that comes late", &["input"])
                         .fitted("delay", delay, "s"),
+                )
+            }
+            Hidden::ElasticCoupling => {
+                let (frequency, ratio) = (40.0 / of.size.sqrt(), 0.05);
+                let spline = Twisting::swinging(self.load, frequency, ratio);
+                self.spline = Some(spline);
+                let doc = "a flexible spline between motor and load";
+                Some(
+                    of.told(doc, &["inertia"])
+                        .fitted("ratio", self.load / self.near(), "1")
+                        .fitted("antiresonance", frequency, "rad/s")
+                        .fitted("damping", ratio, "1")
+                        .physical("stiffness", spline.stiffness, "N m/rad"),
                 )
             }
             _ => None,
