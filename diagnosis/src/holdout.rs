@@ -144,6 +144,7 @@ impl<'a> Holdout<'a> {
         let n = std.len();
         let mut all = Losses::new();
         for (run, x0) in runs.iter().zip(&solution.states) {
+            work.count_plain(run.len());
             let mut simulator = Simulator::new(model, &solution.values).without_trail();
             let (mut sum, mut count) = (0.0, 0usize);
             try_follow(&mut simulator, x0.as_slice(), run, |k, predicted, _| {

@@ -142,7 +142,7 @@ pub use improve::improve;
 pub use improvement::{Improvement, ImprovementStep};
 pub use measurements::Measurements;
 pub use observer::{Because, Correction};
-pub use progress::{CancelToken, Cancelled, Progress, Stage, Work};
+pub use progress::{CancelToken, Cancelled, Progress, Simulated, Stage, Work};
 pub use residual_force::{
     ForceBin, ForceCurve, ForceDependence, ForceExpression, ResidualForce, residual_force,
 };

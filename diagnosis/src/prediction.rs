@@ -111,6 +111,7 @@ impl Pass<'_> {
     where
         DualOf<N>: HostReal,
     {
+        self.work.count_differentiated(self.run.len());
         let By { parameters, states } = self.by;
         let last = (first + N).min(parameters.len() + states.len());
         let seed = |value: f64, place: Option<usize>| match place {
@@ -168,6 +169,7 @@ pub(crate) fn predict_with(
     run: &Run,
     work: &Work<'_>,
 ) -> Result<Vec<f64>, Cancelled> {
+    work.count_plain(run.len());
     let n = model.measured.len();
     let mut predicted = Vec::with_capacity(run.len() * n);
     let mut simulator = Simulator::new(model, values).without_trail();

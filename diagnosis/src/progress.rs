@@ -1,7 +1,7 @@
 //! Progress of long work, and how to stop it.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use serde::Serialize;
 
@@ -93,6 +93,24 @@ pub struct Cancelled;
 
 type Report<'a> = &'a (dyn Fn(&Progress) + Sync);
 
+/// How much some work has simulated, in samples: a measure of what it cost that depends neither on the machine nor on the
+/// number of threads. Divided by the samples of the log it is a number of runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Simulated {
+    /// Samples of predictions.
+    pub plain: u64,
+    /// Samples of predictions with derivatives, each pass over the unknowns counted.
+    pub differentiated: u64,
+}
+
+/// What is counted while work is done.
+#[derive(Debug, Default)]
+struct Counts {
+    plain: AtomicU64,
+    differentiated: AtomicU64,
+}
+
 /// How long work is done: who gets its progress, what stops it, and which criteria it decides by.
 ///
 /// ```
@@ -107,6 +125,7 @@ type Report<'a> = &'a (dyn Fn(&Progress) + Sync);
 pub struct Work<'a> {
     report: Option<Report<'a>>,
     token: CancelToken,
+    counts: Arc<Counts>,
     round: usize,
     criteria: &'a Criteria,
 }
@@ -116,6 +135,7 @@ impl Default for Work<'_> {
         Self {
             report: None,
             token: CancelToken::new(),
+            counts: Arc::default(),
             round: 0,
             criteria: &Criteria::DEFAULT,
         }
@@ -163,6 +183,27 @@ impl<'a> Work<'a> {
     /// The criteria it decides by.
     pub fn criteria(&self) -> &'a Criteria {
         self.criteria
+    }
+
+    /// How much it has simulated so far, in all its parts.
+    pub fn simulated(&self) -> Simulated {
+        Simulated {
+            plain: self.counts.plain.load(Ordering::Relaxed),
+            differentiated: self.counts.differentiated.load(Ordering::Relaxed),
+        }
+    }
+
+    /// Counts so many samples of a prediction.
+    pub(crate) fn count_plain(&self, samples: usize) {
+        self.counts
+            .plain
+            .fetch_add(samples as u64, Ordering::Relaxed);
+    }
+
+    /// Counts so many samples of a prediction with derivatives.
+    pub(crate) fn count_differentiated(&self, samples: usize) {
+        let counted = &self.counts.differentiated;
+        counted.fetch_add(samples as u64, Ordering::Relaxed);
     }
 
     /// Whether it was cancelled.

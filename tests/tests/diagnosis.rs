@@ -214,7 +214,18 @@ fn constant_inputs_and_short_logs_are_refused_with_the_reason() {
     );
 }
 
-/// The number of threads must not show in the result.
+/// A diagnosis, and how many runs over the log it simulated without derivatives and with them.
+fn counted(recording: &Recording) -> (Diagnosis, [u64; 2]) {
+    let work = Work::quiet();
+    let runs = std::slice::from_ref(&recording.run);
+    let found = diagnose(&model(recording), &Measurements::new(runs), &work).unwrap();
+    let simulated = work.simulated();
+    let samples = recording.run.len() as u64;
+    let counts = [simulated.plain, simulated.differentiated];
+    (found, counts.map(|n| n.div_ceil(samples)))
+}
+
+/// The number of threads must not show in the result, nor in what it took.
 #[test]
 fn one_thread_or_two_find_the_same() {
     let recording = log(&[(Hidden::QuadraticDrag, 1.0)], Experiment::Mixed, 8);
@@ -223,9 +234,26 @@ fn one_thread_or_two_find_the_same() {
             .num_threads(threads)
             .build()
             .unwrap();
-        serde_json::to_string(&pool.install(|| judge(&recording, None))).unwrap()
+        let (found, counts) = pool.install(|| counted(&recording));
+        (serde_json::to_string(&found).unwrap(), counts)
     };
     assert_eq!(with(1), with(2));
+}
+
+/// Runs over the log that a diagnosis simulates: `docs/performance.md` has the same table. Where a change makes a
+/// diagnosis better for more runs, both are written anew.
+#[test]
+fn a_diagnosis_simulates_no_more_than_it_did() {
+    for (hidden, table) in [
+        (Hidden::CoulombFriction, [198, 382]),
+        (Hidden::LinearStiffness, [232, 254]),
+    ] {
+        let (_, counts) = counted(&log(&[(hidden, 1.0)], Experiment::Prbs, 1));
+        for (now, before) in counts.into_iter().zip(table) {
+            let (id, most) = (hidden.id(), before + before / 10);
+            assert!(now <= most, "{id}: {counts:?} runs, {table:?} in the table");
+        }
+    }
 }
 
 /// Real logs, where they are: friction of the drivetrains and of the flywheel.
