@@ -12,8 +12,7 @@ pub(crate) struct Bound {
     pub(crate) place: Place,
     side: f64,
     is_position: bool,
-    /// The roles that are bound, by index, with their signals.
-    reads: Vec<(usize, usize)>,
+    reads: [Option<usize>; Role::COUNT],
     /// Signals it reads beside those.
     signals: Vec<usize>,
     /// First of its states in the extended state vector.
@@ -33,8 +32,8 @@ impl Bound {
             Place::Output(i) => Some(i),
             _ => None,
         };
-        let named = self.reads.iter().map(|(_, signal)| signal);
-        named.chain(&self.signals).copied().chain(own)
+        let named = self.reads.iter().flatten().chain(&self.signals);
+        named.copied().chain(own)
     }
 
     /// Whether the effect knows its input already, where so many samples of a run are `foreseen`.
@@ -76,9 +75,7 @@ impl Bounds {
                     side: f64::from(channel.side),
                     is_position: matches!(channel.place, Place::Output(i)
                         if reads_position(model, channel) == Some(i)),
-                    reads: (reads.iter().enumerate())
-                        .filter_map(|(role, signal)| Some((role, (*signal)?)))
-                        .collect(),
+                    reads: *reads,
                     signals: effect.signals.clone(),
                     z: first + bounds.states,
                     n_z: effect.meta.states,
@@ -162,10 +159,6 @@ impl<S: HostReal> Scene<'_, S> {
     }
 
     fn reading<'p>(&'p self, bound: &Bound, nominal: S, past: &'p dyn Past<S>) -> Reading<'p, S> {
-        let mut roles = [None; Role::COUNT];
-        for (role, signal) in &bound.reads {
-            roles[*role] = self.signals.get(*signal);
-        }
         Reading {
             time: self.time,
             from: self.interval.0,
@@ -173,7 +166,7 @@ impl<S: HostReal> Scene<'_, S> {
             nominal,
             side: S::of(bound.side),
             is_position: bound.is_position,
-            roles,
+            roles: bound.reads.map(|read| self.signals.get(read?)),
             signals: self.signals,
             past,
         }
