@@ -182,7 +182,7 @@ pub(crate) fn candidates(
                 .any(|e| e.meta.id == meta.id && e.at.iter().any(|c| at.contains(&c.id)));
             if present
                 || has_another_name(model, meta, &at)
-                || is_unshown(model, &at)
+                || unshown_part(model, &at).is_some()
                 || !can_show(model, meta, &at, runs, criteria)
             {
                 continue;
@@ -330,7 +330,7 @@ pub(crate) fn smooth(model: &mut Model, count: usize, width: f64) -> bool {
 
 /// Whether an effect at a channel is the same as one that the model has at an equivalent channel, or as another
 /// candidate at an equivalent channel in the unit of an input.
-fn has_another_name(model: &Model, meta: &'static EffectMeta, at: &[&str]) -> bool {
+pub(crate) fn has_another_name(model: &Model, meta: &'static EffectMeta, at: &[&str]) -> bool {
     let [id] = at else {
         return false;
     };
@@ -355,10 +355,12 @@ fn has_another_name(model: &Model, meta: &'static EffectMeta, at: &[&str]) -> bo
         .any(|other| has(other) || preferred(model, other, channel))
 }
 
-/// Whether an effect at the channels `at` acts on a part of the plant that is tied because the log does not show it.
-fn is_unshown(model: &Model, at: &[&str]) -> bool {
+/// The part of the plant that an effect at the channels `at` acts on, if it is tied because the log does not show it.
+pub(crate) fn unshown_part(model: &Model, at: &[&str]) -> Option<&'static str> {
     let mut parts = model.tied_parts();
-    parts.any(|part| part.channels.iter().any(|channel| at.contains(channel)))
+    parts
+        .find(|part| part.channels.iter().any(|channel| at.contains(channel)))
+        .map(|part| part.what)
 }
 
 pub(crate) fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<&'static str>> {

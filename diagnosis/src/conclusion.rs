@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::estimate::Estimate;
 use crate::observer::Correction;
 use crate::residual_force::ResidualForce;
+use crate::untried::Untried;
 use crate::where_it_fails::Statement;
 
 /// An error, as in the JSON answer.
@@ -98,6 +99,8 @@ pub struct Diagnosis {
     pub missing: Option<EffectAt>,
     /// Explanations, best first.
     pub candidates: Vec<Explanation>,
+    /// Effects that were not tried, because the recording cannot show them.
+    pub not_tried: Vec<Untried>,
     /// Where the model fails, in words.
     pub where_it_fails: Vec<Statement>,
     /// The missing force, where no effect of the library explains it.

@@ -25,6 +25,7 @@ use crate::search::{Found, Search};
 use crate::settings::FitSettings;
 use crate::sufficiency;
 use crate::trial::{FINAL, Judged, Nominal};
+use crate::untried::untried;
 use crate::where_it_fails::{predictable, where_it_fails};
 
 /// Adds every effect of the library to `model` at every channel it fits, and refits all parameters each time.
@@ -96,6 +97,7 @@ impl Diagnosis {
             verdict: Conclusion::Cancelled,
             missing: None,
             candidates: Vec::new(),
+            not_tried: Vec::new(),
             where_it_fails: Vec::new(),
             residual_force: None,
             faults: faults.to_vec(),
@@ -319,6 +321,7 @@ fn search(
     let runs = nominal.holdout.runs;
     let criteria = &work.criteria().search;
     let all = candidates(nominal.model, runs, &rms, observed, criteria);
+    diagnosis.not_tried = untried(nominal.model, runs, criteria);
     let search = Search {
         all: &all,
         nominal,

@@ -121,6 +121,7 @@ pub mod tracking;
 mod trial;
 mod unfold;
 mod unshown;
+mod untried;
 mod where_it_fails;
 mod whole;
 mod window;
@@ -148,4 +149,5 @@ pub use residual_force::{
 };
 pub use score::SignalScore;
 pub use settings::{FitSettings, ImproveSettings, Method, Scheme};
+pub use untried::Untried;
 pub use where_it_fails::Statement;

@@ -37,6 +37,26 @@ fn masses(model: &Model) -> usize {
     rates.filter(|c| matches!(c.place, Place::Rate(_))).count()
 }
 
+/// What a recording lacks in which an effect [cannot show](can_show); none where it is not the recording that lacks it.
+pub(crate) fn what_is_absent(
+    meta: &EffectMeta,
+    model: &Model,
+    runs: &[Run],
+) -> Option<&'static str> {
+    Some(match meta.shows {
+        // That is a matter of the plant.
+        Shows::Anywhere | Shows::OneMass => return None,
+        Shows::NeverNegative
+            if !(0..model.plant.inputs.len()).any(|input| goes_both_ways(input, runs)) =>
+        {
+            "no input goes both ways"
+        }
+        Shows::NeverNegative => "what is measured goes below zero",
+        Shows::OneRun => "the recording has several runs",
+        Shows::InputAtZero => "no input rests at zero between other values",
+    })
+}
+
 /// Whether an input has values of both signs.
 fn goes_both_ways(input: usize, runs: &[Run]) -> bool {
     let all = || runs.iter().flat_map(|run| values(run, input));

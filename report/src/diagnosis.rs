@@ -6,11 +6,11 @@ use crate::beside::{self, Names};
 use crate::candidates;
 use crate::comparison::faults;
 use crate::conclusion::conclusion;
-use crate::html::{marked, sentence, text};
+use crate::html::{escape, marked, sentence, text};
 use crate::next;
 use crate::page::{Context, page, section};
 use crate::residual_force::residual_force;
-use crate::words::diagnosis::{said, with_effect};
+use crate::words::diagnosis::{not_tried, said, with_effect};
 use crate::words::{percent, recordings};
 
 /// The page of a diagnosis: the verdict, the model `before` and `after` the best explanation was added,
@@ -53,7 +53,7 @@ pub fn diagnosis_page(
         body.push_str(&section(
             "What could be missing",
             CANDIDATES,
-            &candidates::candidates(diagnosis),
+            &(candidates::candidates(diagnosis) + &untried(diagnosis)),
         ));
     }
     body.push_str(&advice(&diagnosis.advice));
@@ -66,8 +66,15 @@ pub fn diagnosis_page(
     page(context, &body)
 }
 
+/// The effects that were not tried.
+fn untried(diagnosis: &Diagnosis) -> String {
+    not_tried(diagnosis).map_or_else(String::new, |sentence| {
+        format!("<p>{}</p>\n", escape(&sentence))
+    })
+}
+
 /// What is to be seen in a list of explanations.
-pub(crate) const CANDIDATES: &str = "Every effect of the library was added to the model at every place where it \
+pub(crate) const CANDIDATES: &str = "Every effect that the log can show was added to the model at every place where it \
     fits. All parameters were fitted again, and the free run was judged on data that the fit did not see. The \
     first candidate is the simplest that is not clearly worse than the best. The others follow by their error. \
     Tap a candidate to see what it is and what helps against it.";

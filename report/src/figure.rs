@@ -9,10 +9,10 @@ use crate::thin::kept;
 /// Twice the size shown: the backend draws to whole pixels.
 const WIDTH: u32 = 1600;
 const PANEL_HEIGHT: u32 = 440;
-const TEXT: i32 = 30;
+pub(crate) const TEXT: i32 = 30;
 /// Most points of a line: two for each pixel across.
 const MOST_POINTS: usize = 2 * WIDTH as usize;
-const INK: RGBColor = RGBColor(0x33, 0x33, 0x33);
+pub(crate) const INK: RGBColor = RGBColor(0x33, 0x33, 0x33);
 
 /// A picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -91,10 +91,11 @@ pub fn figure_svg(figure: &Figure) -> String {
     svg
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
+pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(crate) type Drawn<'a> =
+    Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
 
-fn font(size: i32) -> TextStyle<'static> {
+pub(crate) fn font(size: i32) -> TextStyle<'static> {
     ("Helvetica, Arial, sans-serif", size)
         .into_font()
         .color(&INK)
@@ -121,7 +122,7 @@ fn draw<'a>(figure: &Figure, root: &Area<'a>, title: u32) -> Drawn<'a> {
     Ok(())
 }
 
-fn draw_panel<'a>(
+pub(crate) fn draw_panel<'a>(
     panel: &FigurePanel,
     area: &Area<'a>,
     span_of_time: std::ops::Range<f64>,
@@ -135,8 +136,7 @@ fn draw_panel<'a>(
         .y_label_area_size(130)
         .x_label_area_size(if last { 76 } else { 44 })
         .build_cartesian_2d(span_of_time, values.clone())?;
-    let digits = |range: f64| (1 - (range / 6.0).log10().floor() as i32).clamp(0, 6) as usize;
-    let decimals = digits(values.end - values.start).saturating_sub(1);
+    let high = values.end - values.start;
     chart
         .configure_mesh()
         .disable_x_mesh()
@@ -147,11 +147,7 @@ fn draw_panel<'a>(
         .x_labels(10)
         .y_labels(6)
         .x_label_formatter(&|t| format!("{}", (t * 1000.0).round() / 1000.0))
-        .y_label_formatter(&|v| {
-            // A rounding error below zero is no −0.00.
-            let zero = v.abs() < 0.5 * 10f64.powi(-(decimals as i32));
-            format!("{:.decimals$}", if zero { 0.0 } else { *v }).replace('-', "−")
-        })
+        .y_label_formatter(&|v| ticks(*v, high))
         .x_desc(if last { "time, s" } else { "" })
         .axis_desc_style(font(TEXT))
         .draw()?;
@@ -162,6 +158,15 @@ fn draw_panel<'a>(
         }
     }
     legend(panel, area)
+}
+
+/// A value at an axis of this range, with as many digits as tell its marks apart.
+pub(crate) fn ticks(value: f64, range: f64) -> String {
+    let digits = (1 - (range / 6.0).log10().floor() as i32).clamp(0, 6) as usize;
+    let decimals = digits.saturating_sub(1);
+    // A rounding error below zero is no −0.00.
+    let zero = value.abs() < 0.5 * 10f64.powi(-(decimals as i32));
+    format!("{:.decimals$}", if zero { 0.0 } else { value }).replace('-', "−")
 }
 
 /// What the axis shows at the left above the panel, the traces' names after it.
@@ -205,7 +210,7 @@ fn stretches(trace: &FigureTrace) -> Vec<Vec<(f64, f64)>> {
 }
 
 /// From the least to the greatest finite value, widened by `margin` of it; never empty.
-fn span<'a>(values: impl Iterator<Item = &'a f64>, margin: f64) -> std::ops::Range<f64> {
+pub(crate) fn span<'a>(values: impl Iterator<Item = &'a f64>, margin: f64) -> std::ops::Range<f64> {
     let (low, high) = values
         .filter(|v| v.is_finite())
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {

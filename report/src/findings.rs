@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use loopsight_diagnosis::{
     Advice, Comparison, Conclusion, Diagnosis, EffectAt, Estimate, Explanation, Fit, Improvement,
-    ImprovementStep, Level, Method, ParameterVerdict, Statement,
+    ImprovementStep, Level, Method, ParameterVerdict, Statement, Untried,
 };
 use loopsight_model::model::Model;
 use loopsight_plants as _;
@@ -103,6 +103,10 @@ pub(crate) fn diagnosis(verdict: Conclusion) -> Diagnosis {
         } else {
             std::iter::once(best).chain(others).collect()
         },
+        not_tried: vec![Untried {
+            effect: "bridge_coast".into(),
+            why: "no input rests at zero between other values".into(),
+        }],
         where_it_fails: vec![Statement {
             statement: "73 % of it after changes".into(),
             share_of_squared_error: 0.73,
@@ -292,6 +296,7 @@ fn nothing_breaks_out_of_a_finding() {
     diagnosis.faults = super::findings::diagnosis(Conclusion::LogFaulty).faults;
     diagnosis.faults[0].detail = nasty.into();
     diagnosis.where_it_fails[0].statement = nasty.into();
+    diagnosis.not_tried[0].why = nasty.into();
     diagnosis.advice[0].why = nasty.into();
     diagnosis.advice[0].experiment = nasty.into();
     let estimate = diagnosis.candidates[0].parameters["level"].clone();

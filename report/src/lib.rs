@@ -70,6 +70,7 @@ mod residual_force;
 mod run;
 mod run_figure;
 mod scatter;
+mod symptom;
 mod thin;
 mod typeset;
 pub mod words;
@@ -93,4 +94,5 @@ pub use record::{
 };
 pub use run::run_page;
 pub use run_figure::run_figure;
+pub use symptom::{MeanAt, MeanOver, symptom_svg};
 pub use words::ASTRAY;

@@ -193,6 +193,7 @@ fn the_agreed_keys_are_required() {
                     "floor",
                     "verdict",
                     "missing",
+                    "not_tried",
                     "candidates",
                     "faults",
                     "advice",

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use loopsight_diagnosis::{Comparison, Diagnosis, Explanation, Measurements, Work, compare};
+use loopsight_diagnosis::{
+    Comparison, Diagnosis, Explanation, Measurements, Untried, Work, compare,
+};
 use loopsight_model::model::Model as Composed;
 use loopsight_model::run::Run;
 use serde::Serialize;
@@ -35,6 +37,8 @@ pub struct DiagnoseAnswer {
     pub missing: Option<EffectAt>,
     /// Explanations, best first.
     pub candidates: Vec<Candidate>,
+    /// Effects of the library that fit the plant and were not tried, because the log cannot show them.
+    pub not_tried: Vec<NotTried>,
     /// Where the model as it is fails, the most telling first.
     pub where_it_fails: Vec<Failing>,
     /// The missing force, where no effect of the library explains it.
@@ -87,6 +91,26 @@ pub struct Candidate {
     pub note: String,
 }
 
+/// An effect of the library that fits the plant and was not tried.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub struct NotTried {
+    /// Id of the effect.
+    pub effect: String,
+    /// What the log does not show.
+    pub why: String,
+}
+
+impl From<&Untried> for NotTried {
+    fn from(untried: &Untried) -> Self {
+        Self {
+            effect: untried.effect.clone(),
+            why: untried.why.clone(),
+        }
+    }
+}
+
 impl From<&Explanation> for Candidate {
     fn from(explanation: &Explanation) -> Self {
         Self {
@@ -122,6 +146,7 @@ impl DiagnoseAnswer {
             verdict: engine.verdict.into(),
             missing: engine.missing.as_ref().map(Into::into),
             candidates: all(&engine.candidates),
+            not_tried: all(&engine.not_tried),
             where_it_fails: all(&engine.where_it_fails),
             residual_force: engine.residual_force.as_ref().map(Into::into),
             faults: all(&engine.faults),

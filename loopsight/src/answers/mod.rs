@@ -35,7 +35,7 @@ pub use common::{
 };
 pub use compare::CompareAnswer;
 pub use convert::ConvertAnswer;
-pub use diagnose::{Candidate, DiagnoseAnswer};
+pub use diagnose::{Candidate, DiagnoseAnswer, NotTried};
 pub use experiment::{ConsideredExperiment, ExperimentAnswer};
 pub use explain::{
     ExplainAnswer, Explained, ExplainedChannel, ExplainedDerived, ExplainedHome,

@@ -169,7 +169,8 @@ class Fit(SeriesResult):
 
 
 class Diagnosis(SeriesResult):
-    """Which effect a model lacks: ``verdict``, ``missing``, ``candidates``, ``advice``."""
+    """Which effect a model lacks: ``verdict``, ``missing``, ``candidates``, ``not_tried``,
+    ``advice``."""
 
     def candidates_frame(self) -> Any:
         """The explanations, best first, as a pandas data frame."""

@@ -193,10 +193,25 @@ pub fn text(diagnosis: &Diagnosis) -> String {
         let head = ["explanation", "error", "significance", "parameters"];
         text.push_str(&format!("\n\n{}\n", table(&head, &rows)));
     }
+    if let Some(sentence) = not_tried(diagnosis) {
+        text.push_str(&format!("\n{sentence}\n"));
+    }
     text.push_str(&where_it_fails(&diagnosis.where_it_fails));
     text.push_str(&advice::lines(&diagnosis.advice));
     text.push_str(&force::text(diagnosis.residual_force.as_ref()));
     text
+}
+
+/// Which effects were not tried, and why; none where all were.
+pub(crate) fn not_tried(diagnosis: &Diagnosis) -> Option<String> {
+    let each = diagnosis.not_tried.iter();
+    let list: Vec<String> = each.map(|u| format!("{} ({})", u.effect, u.why)).collect();
+    (!list.is_empty()).then(|| {
+        format!(
+            "Not tried, since this log cannot show it: {}.",
+            list.join(", ")
+        )
+    })
 }
 
 fn row(explanation: &Explanation) -> Vec<String> {
