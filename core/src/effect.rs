@@ -11,6 +11,8 @@ pub enum Shows {
     NeverNegative,
     /// The input at the channel rests at zero between other values.
     InputAtZero,
+    /// The position (or head) at the channel stays at one end of where it goes, instead of turning round there.
+    AtEnd,
     /// The recording is one run. What changes with time alone does not begin anew with every run, and how long the machine
     /// ran between two of them is not known.
     OneRun,
@@ -46,7 +48,7 @@ pub struct EffectMeta {
     /// It acts oppositely on two sides; a channel without a [`crate::Channel::side`] is refused.
     pub sided: bool,
     /// Its parameters, shared by all the channels of one instance. In their units `channel` stands
-    /// for the unit of the channel, `flow` and `position` for those of the signals with these
+    /// for the unit of the channel, `flow`, `position` and `head` for those of the signals with these
     /// roles there; such parameters count in sizes, see [`crate::Channel::size`].
     pub parameters: &'static [Parameter],
     /// Acts on all its channels together, as one instance: one supply, one body.

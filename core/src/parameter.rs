@@ -43,6 +43,8 @@ pub struct Parameter {
     pub starts: &'static [f64],
     /// `starts` are fractions of the duration of the recording.
     pub starts_in_durations: bool,
+    /// A fit starts where the position (or head) of the recording ends: it is a limit of it.
+    pub starts_at_ends: bool,
     /// Sides on which it acts, see [`crate::Channel::side`]; empty: everywhere. Where an effect is attached to none of
     /// them, it is frozen in a fit.
     pub sides: &'static [i8],
@@ -71,6 +73,7 @@ impl Parameter {
             scale: 1.0,
             starts: &[],
             starts_in_durations: false,
+            starts_at_ends: false,
             sides: &[],
         }
     }
@@ -137,6 +140,12 @@ impl Parameter {
     pub const fn starting_within(mut self, fractions: &'static [f64]) -> Self {
         self.starts = fractions;
         self.starts_in_durations = true;
+        self
+    }
+
+    /// A limit of the position: a fit should start where that of the recording ends.
+    pub const fn starting_at_ends(mut self) -> Self {
+        self.starts_at_ends = true;
         self
     }
 

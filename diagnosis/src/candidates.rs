@@ -7,6 +7,7 @@ use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
 
 use crate::criteria::SearchCriteria;
+use crate::ends::{Ends, limited};
 use crate::equivalent::{equivalent, preferred};
 use crate::positions::Positions;
 use crate::shows::can_show;
@@ -27,6 +28,8 @@ pub(crate) struct Candidate {
     pub(crate) flow: f64,
     /// The same of the position.
     pub(crate) reach: f64,
+    /// Where the position (or head) at its channels ends in the recording.
+    pub(crate) ends: Ends,
     /// It can be tried at the measured positions: it reads a position, and no observer corrects the free runs.
     pub(crate) by_position: bool,
     /// Widths over which signs of all effects are smoothed at first, by index of the parameter.
@@ -153,6 +156,18 @@ impl Candidate {
     }
 }
 
+/// What was seen of the machine.
+pub(crate) struct Seen<'a> {
+    pub(crate) runs: &'a [Run],
+    /// Root mean squares of the plant's signals in the recording. Smoothing widths are set from them, because
+    /// machines move at very different speeds.
+    pub(crate) rms: &'a [f64],
+    /// Where these signals end.
+    pub(crate) ends: &'a [Ends],
+    /// An observer corrects the free runs.
+    pub(crate) observed: bool,
+}
+
 /// All candidates for `model`: each effect at every single channel it fits, and at all channels of a
 /// family (both wheels, all inputs), alike and each with its own parameters.
 ///
@@ -160,17 +175,17 @@ impl Candidate {
 /// measured, and effects that cannot show in `runs`. Where the log's inputs were measured at the machine, effects
 /// before that point are left out too, and where a part of the plant is tied because the log does not show it,
 /// effects on that part. An effect that contains one of the model's at the same channels replaces it.
-///
-/// `rms` are the root mean squares of the plant's signals in the recording. Smoothing widths are set from
-/// them, because machines move at very different speeds. `observed` says that an observer corrects the free
-/// runs.
 pub(crate) fn candidates(
     model: &Model,
-    runs: &[Run],
-    rms: &[f64],
-    observed: bool,
+    seen: &Seen<'_>,
     criteria: &SearchCriteria,
 ) -> Vec<Candidate> {
+    let Seen {
+        runs,
+        rms,
+        ends,
+        observed,
+    } = *seen;
     let sign_width = criteria.sign_width;
     let mut found = Vec::new();
     let possible = |meta: &&EffectMeta| !(model.log.inputs_measured && meta.before_input);
@@ -183,7 +198,7 @@ pub(crate) fn candidates(
             if present
                 || has_another_name(model, meta, &at)
                 || unshown_part(model, &at).is_some()
-                || !can_show(model, meta, &at, runs, criteria)
+                || !can_show(model, meta, &at, runs, ends, criteria)
             {
                 continue;
             }
@@ -224,6 +239,7 @@ pub(crate) fn candidates(
                         by_position: !observed && Positions::matter_to(meta),
                         widths: widths(&model, rms, sign_width),
                         reach: last_rms(&model, Role::Position, rms),
+                        ends: last_ends(&model, ends),
                         model,
                         flow,
                         entries: None,
@@ -279,6 +295,17 @@ fn is_reference(declaration: &Parameter) -> bool {
 fn last_rms(model: &Model, role: Role, rms: &[f64]) -> f64 {
     let last = model.effects.last();
     last.map_or(0.0, |effect| role_rms(model, effect, role, rms))
+}
+
+/// Where the position (or head) at the channels of the last effect ends; none where nothing limits it.
+fn last_ends(model: &Model, ends: &[Ends]) -> Ends {
+    let channels = model
+        .effects
+        .last()
+        .into_iter()
+        .flat_map(|effect| &effect.at);
+    let all = channels.filter_map(|c| ends.get(limited(model, c)?));
+    [0, 1].map(|side| all.clone().find_map(|ends| ends[side]))
 }
 
 /// Root mean square of a signal, by its role, at an effect's channels; 0 where there is none.
@@ -380,9 +407,12 @@ pub(crate) fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<
     }
     // Parameters in the channel's unit mean the same at channels of one unit only.
     let in_unit_of_channel = meta.parameters.iter().any(|p| p.unit.contains("channel"));
+    // Each place has a limit of its own.
+    let limits = meta.parameters.iter().any(|p| p.starts_at_ends);
     let mut sets = Vec::new();
     for (_, members) in families {
         let alike = members.len() > 1
+            && !limits
             && (!in_unit_of_channel || members.iter().all(|c| c.unit == members[0].unit));
         if alike || meta.shared_only {
             sets.push(members.iter().map(|c| c.id).collect());
@@ -434,7 +464,13 @@ mod tests {
             run.push(0.01 * f64::from(k), &[u, u], &[u, u]).unwrap();
         }
         let rms = vec![1.0; robot.n_signals()];
-        let all = candidates(&robot, &[run], &rms, false, &SearchCriteria::DEFAULT);
+        let seen = Seen {
+            runs: &[run],
+            rms: &rms,
+            ends: &[],
+            observed: false,
+        };
+        let all = candidates(&robot, &seen, &SearchCriteria::DEFAULT);
         all.into_iter().flat_map(|c| c.at).collect()
     }
 

@@ -3,12 +3,13 @@
 use loopsight_model::model::Model;
 use loopsight_recordings::{Fault, Severity};
 
-use crate::candidates::candidates;
+use crate::candidates::{Seen, candidates};
 use crate::conclude::{Evidence, REPORTED, conclude};
 use crate::conclusion::{Conclusion, Diagnosis, Level};
 use crate::criteria::Criteria;
 use crate::discover::discovered;
 use crate::ending::{Read, finalists_on_all, plain_on_all};
+use crate::ends::ends;
 use crate::error::FitError;
 use crate::explain::explain_look;
 use crate::floor::floor;
@@ -317,11 +318,22 @@ fn search(
         nominal.holdout.runs,
         work,
     )?;
-    let observed = diagnosis.observer.is_some();
-    let runs = nominal.holdout.runs;
+    let ends = ends(
+        nominal.model,
+        &nominal.solution.values,
+        &nominal.solution.states,
+        nominal.holdout.runs,
+        work,
+    )?;
+    let seen = Seen {
+        runs: nominal.holdout.runs,
+        rms: &rms,
+        ends: &ends,
+        observed: diagnosis.observer.is_some(),
+    };
     let criteria = &work.criteria().search;
-    let all = candidates(nominal.model, runs, &rms, observed, criteria);
-    diagnosis.not_tried = untried(nominal.model, runs, criteria);
+    let all = candidates(nominal.model, &seen, criteria);
+    diagnosis.not_tried = untried(nominal.model, &seen, criteria);
     let search = Search {
         all: &all,
         nominal,

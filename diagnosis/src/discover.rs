@@ -35,6 +35,7 @@ fn candidate(expression: &ForceExpression, nominal: &Nominal<'_>) -> Option<Cand
         replaces: None,
         flow: 0.0,
         reach: 0.0,
+        ends: [None; 2],
         by_position: false,
         widths: Vec::new(),
         entries: Some(expression.toml.clone()),

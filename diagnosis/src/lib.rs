@@ -76,6 +76,7 @@ mod derived;
 mod diagnose;
 mod discover;
 mod ending;
+mod ends;
 mod equivalent;
 mod error;
 mod estimate;

@@ -68,14 +68,21 @@ impl Positions {
         (!positions.direct.is_empty() || !positions.by_rate.is_empty()).then_some(positions)
     }
 
-    /// As [`try_follow`], the positions corrected after each sample.
-    fn run<S: HostReal, E>(
+    /// The states whose values are the measured positions.
+    pub(crate) fn states(&self) -> impl Iterator<Item = usize> + '_ {
+        let of = |(state, _): &(usize, Vec<f64>)| *state;
+        self.direct.iter().chain(&self.by_rate).map(of)
+    }
+
+    /// As [`try_follow`], the positions corrected after each sample; `corrected` gets the simulator then.
+    pub(crate) fn run<S: HostReal, E>(
         &self,
         simulator: &mut Simulator<'_, S>,
         x0: &[S],
         run: &Run,
         n_measured: usize,
         mut each: impl FnMut(usize, &[S]) -> Result<(), E>,
+        mut corrected: impl FnMut(&mut Simulator<'_, S>),
     ) -> Result<(), E> {
         if run.is_empty() {
             return Ok(());
@@ -101,6 +108,7 @@ impl Positions {
                     }
                 }
             }
+            corrected(simulator);
         }
         Ok(())
     }
@@ -118,7 +126,7 @@ pub(crate) fn run_with<S: HostReal, E>(
     match positions {
         // An observer corrects the positions as well.
         Some(positions) if run.observer().is_none() => {
-            positions.run(simulator, x0, run, n_measured, each)
+            positions.run(simulator, x0, run, n_measured, each, |_| ())
         }
         _ => try_follow(simulator, x0, run, |k, outputs, _| each(k, outputs)),
     }

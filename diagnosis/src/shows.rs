@@ -5,17 +5,19 @@ use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 
 use crate::criteria::SearchCriteria;
+use crate::ends::{Ends, limited};
 
 /// Share of the largest command below which a command counts as zero.
 const ZERO: f64 = 1e-3;
 
 /// Whether an effect at the channels `at` can show in `runs`. A candidate that cannot is not tried, so that the cost of
-/// a diagnosis does not grow with every effect of the library.
+/// a diagnosis does not grow with every effect of the library. `ends` are those of the plant's signals.
 pub(crate) fn can_show(
     model: &Model,
     meta: &EffectMeta,
     at: &[&str],
     runs: &[Run],
+    ends: &[Ends],
     criteria: &SearchCriteria,
 ) -> bool {
     let mut channels = (model.plant.channels.iter()).filter(|c| at.contains(&c.id));
@@ -28,6 +30,10 @@ pub(crate) fn can_show(
         Shows::OneRun => runs.len() == 1,
         Shows::OneMass => masses(model) == 1,
         Shows::InputAtZero => channels.any(|c| rests(c, runs, criteria.rests_s)),
+        Shows::AtEnd => channels.any(|c| {
+            let ends = limited(model, c).and_then(|signal| ends.get(signal));
+            ends.is_some_and(|ends| ends.iter().any(Option::is_some))
+        }),
     }
 }
 
@@ -53,6 +59,7 @@ pub(crate) fn what_is_absent(
         }
         Shows::NeverNegative => "what is measured goes below zero",
         Shows::OneRun => "the recording has several runs",
+        Shows::AtEnd => "no level stays at the end of where it goes",
         Shows::InputAtZero => "no input rests at zero between other values",
     })
 }
@@ -127,7 +134,7 @@ mod tests {
             shows: what,
             ..EffectMeta::PLAIN
         };
-        can_show(&axis, &meta, &[at], &[run], &SearchCriteria::DEFAULT)
+        can_show(&axis, &meta, &[at], &[run], &[], &SearchCriteria::DEFAULT)
     }
 
     #[test]
@@ -179,7 +186,7 @@ mod tests {
         };
         let two = [Run::empty(1, 1), Run::empty(1, 1)];
         let criteria = SearchCriteria::DEFAULT;
-        assert!(!can_show(&axis, &meta, &["input"], &two, &criteria));
+        assert!(!can_show(&axis, &meta, &["input"], &two, &[], &criteria));
     }
 
     /// A cart and its pole are two.
@@ -199,6 +206,7 @@ mod tests {
             &meta,
             &["inertia.motor"],
             &runs,
+            &[],
             &criteria
         ));
     }

@@ -144,8 +144,12 @@ fn starts(
         if listed.is_empty() && !parameter.declaration.starts.is_empty() {
             return Vec::new();
         }
+        let at_ends = parameter.declaration.starts_at_ends;
+        let ends: Vec<f64> = candidate.ends.into_iter().flatten().flatten().collect();
         let values: Vec<f64> = if let Some(value) = known.get(parameter.declaration.id) {
             vec![*value]
+        } else if at_ends && parameter.free && !ends.is_empty() {
+            ends.into_iter().map(nearest).collect()
         } else if !parameter.free && listed.is_empty() {
             vec![neutral]
         } else if parameter.free && parameter.declaration.unit == "flow" && candidate.flow > 0.0 {

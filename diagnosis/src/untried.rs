@@ -3,10 +3,9 @@
 use loopsight_core::EffectMeta;
 use loopsight_model::model::Model;
 use loopsight_model::registry;
-use loopsight_model::run::Run;
 use serde::Serialize;
 
-use crate::candidates::{channel_sets, has_another_name, unshown_part};
+use crate::candidates::{Seen, channel_sets, has_another_name, unshown_part};
 use crate::criteria::SearchCriteria;
 use crate::shows::{can_show, what_is_absent};
 
@@ -20,7 +19,7 @@ pub struct Untried {
 }
 
 /// The effects that fit the plant of `model`, are not in it, and are tried at no channel.
-pub(crate) fn untried(model: &Model, runs: &[Run], criteria: &SearchCriteria) -> Vec<Untried> {
+pub(crate) fn untried(model: &Model, seen: &Seen<'_>, criteria: &SearchCriteria) -> Vec<Untried> {
     let in_model = |meta: &EffectMeta| model.effects.iter().any(|e| e.meta.id == meta.id);
     let effects = registry::effects();
     let others = effects.into_iter().filter(|meta| !in_model(meta));
@@ -28,7 +27,7 @@ pub(crate) fn untried(model: &Model, runs: &[Run], criteria: &SearchCriteria) ->
         .filter_map(|meta| {
             Some(Untried {
                 effect: meta.id.to_owned(),
-                why: why(model, meta, runs, criteria)?,
+                why: why(model, meta, seen, criteria)?,
             })
         })
         .collect()
@@ -38,7 +37,7 @@ pub(crate) fn untried(model: &Model, runs: &[Run], criteria: &SearchCriteria) ->
 fn why(
     model: &Model,
     meta: &'static EffectMeta,
-    runs: &[Run],
+    seen: &Seen<'_>,
     criteria: &SearchCriteria,
 ) -> Option<String> {
     let mut sets = channel_sets(model, meta);
@@ -52,15 +51,16 @@ fn why(
     {
         return Some(format!("the log does not show {part}"));
     }
-    let shows = |at: &Vec<&str>| can_show(model, meta, at, runs, criteria);
+    let shows = |at: &Vec<&str>| can_show(model, meta, at, seen.runs, seen.ends, criteria);
     if sets.iter().any(shows) {
         return None;
     }
-    what_is_absent(meta, model, runs).map(str::to_owned)
+    what_is_absent(meta, model, seen.runs).map(str::to_owned)
 }
 
 #[cfg(test)]
 mod tests {
+    use loopsight_model::run::Run;
     use loopsight_plants as _;
 
     use super::*;
@@ -81,7 +81,13 @@ mod tests {
                 run
             })
             .collect();
-        let all = untried(&model, &runs, &SearchCriteria::DEFAULT);
+        let seen = Seen {
+            runs: &runs,
+            rms: &[],
+            ends: &[],
+            observed: false,
+        };
+        let all = untried(&model, &seen, &SearchCriteria::DEFAULT);
         all.into_iter().map(|u| (u.effect, u.why)).collect()
     }
 

@@ -28,7 +28,8 @@ macro_rules! effects {
                 match self { $(Hidden::$variant => $doc,)* }
             }
 
-            /// The machine of motors and wheels on which it is shown; [`catalogue`] has the others.
+            /// The machine on which it is shown first, one of motors and wheels where these can have it; [`catalogue`] has the
+            /// others.
             pub fn home(self) -> Robot {
                 match self { $(Hidden::$variant => Robot::$home,)* }
             }
@@ -44,6 +45,7 @@ pub fn catalogue() -> Vec<(Robot, Hidden)> {
         robot
             .rig_effects()
             .iter()
+            .filter(move |effect| effect.home() != robot)
             .map(move |effect| (robot, *effect))
     });
     homes.chain(rigs).collect()
@@ -64,6 +66,7 @@ effects! {
     GravityPendulum "gravity_pendulum" Axis "an arm, horizontal at angle 0",
     LinearStiffness "linear_stiffness" Axis "a spring that pulls back to angle 0",
     CubicStiffness "cubic_stiffness" Axis "a hardening spring without linear part",
+    Overflow "overflow" TankPair "an upper tank that runs over its edge",
     Hysteresis "hysteresis" Axis "a rubber joint to the ground, whose force depends on the way it came",
     CentrifugalOffset "centrifugal_offset" Twil "centre of mass ahead of the axle",
     WheelSlip "wheel_slip" Twil "tyres on a slippery floor; odometry from undriven measuring wheels",

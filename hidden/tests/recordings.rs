@@ -260,6 +260,7 @@ fn the_committed_recordings_are_these() {
         (Robot::Axis, Hidden::Hysteresis),
         (Robot::Oscillator, Hidden::Hysteresis),
         (Robot::Axis, Hidden::ElasticCoupling),
+        (Robot::TankPair, Hidden::Overflow),
     ] {
         let lesson = robot.lesson(Some(effect));
         record(robot, &[(effect, 1.0)], lesson, 1)

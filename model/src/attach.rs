@@ -127,7 +127,7 @@ pub(crate) fn bind(
 }
 
 /// The unit of an effect's parameter at a channel, and what 1 of its default and scale is there:
-/// `channel`, `flow` and `position` are filled in.
+/// `channel`, `flow`, `position` and `head` are filled in.
 ///
 /// `channel/flow^2` at a wheel is `V/(rad/s)^2`.
 pub fn unit_at(unit: &str, channel: &Channel, plant: &'static PlantMeta) -> (String, f64) {
@@ -143,6 +143,7 @@ pub fn unit_at(unit: &str, channel: &Channel, plant: &'static PlantMeta) -> (Str
         ("channel", (channel.unit, channel.size)),
         ("flow", signal(Role::Flow)),
         ("position", signal(Role::Position)),
+        ("head", signal(Role::Head)),
     ] {
         let Some((before, after)) = unit.split_once(word) else {
             continue;

@@ -29,8 +29,8 @@ use loopsight_core::{
 /// a film is slow: `f(h) = √(2 g) h/(h² + h_0²)^¼` with `h_0` = 1 mm, which differs by `(h_0/h)²/4`,
 /// 2.5e-5 at 10 cm.
 ///
-/// Assumptions: prismatic tanks that do not overflow, outlets that are short; a pump without
-/// dynamics.
+/// Assumptions: prismatic tanks that do not overflow (that is an effect, `overflow`), outlets that are short; a pump
+/// without dynamics.
 ///
 /// Reference: M. Schoukens, J. P. Noël (2017), "Three benchmarks addressing open challenges in
 /// nonlinear system identification", IFAC PapersOnLine 50-1, 446–451, section 3, cascaded tanks.
@@ -107,6 +107,9 @@ const PHYSICAL: [Parameter; 5] = [
 ];
 
 const PUMP: [Reads; 1] = [Reads(Role::Drive, "pump")];
+/// What runs over the edge of a tank depends on its level.
+const FILLED_UPPER: [Reads; 1] = [Reads(Role::Head, "level_upper")];
+const FILLED_LOWER: [Reads; 1] = [Reads(Role::Head, "level_lower")];
 const UPPER: [Reads; 2] = [
     Reads(Role::Flow, "outflow_upper"),
     Reads(Role::Head, "level_upper"),
@@ -122,7 +125,7 @@ const CHANNELS: [Channel; 7] = [
         place: Place::Effort(0),
         unit: "m/s",
         equation: "h'_1 -> h'_1 + w",
-        reads: &[],
+        reads: &FILLED_UPPER,
         side: 0,
         size: 1e-3,
         doc: "the balance of the upper tank; what else fills it, as the rate of its level",
@@ -132,7 +135,7 @@ const CHANNELS: [Channel; 7] = [
         place: Place::Effort(1),
         unit: "m/s",
         equation: "h'_2 -> h'_2 + w",
-        reads: &[],
+        reads: &FILLED_LOWER,
         side: 0,
         size: 1e-3,
         doc: "the balance of the lower tank; what else fills it, as the rate of its level",

@@ -17,6 +17,7 @@ use loopsight_plants as _;
 const DDMR: &str = "[plant.ddmr]\nK_A = -15.146\nK_B = 0.005\nK_C = 0.136\nK_D = -9.573\n\
                     K_E = -3.945\nK_F = 0.656\nhalf_track = 0.131\nwheel_radius = 0.05\n";
 const AXIS: &str = "[plant.dc_axis]\nK_A = -4.0\nK_C = 3.0\n";
+const TANKS: &str = "[plant.tank_pair]\npump = 2.0e-3\noutlet_upper = 4.0e-3\ninlet_lower = 4.0e-3\noutlet_lower = 3.5e-3\n";
 
 fn model(text: &str) -> Model {
     Model::from_toml("test.toml", text).unwrap().0
@@ -180,7 +181,7 @@ fn derivatives(model: &Model, values: &[f64], by: usize) -> Vec<Vec<f64>> {
 #[test]
 fn every_effect_fits_somewhere_and_its_declaration_reads() {
     let mut cases: BTreeMap<&str, usize> = BTreeMap::new();
-    for text in [DDMR, AXIS] {
+    for text in [DDMR, AXIS, TANKS] {
         let plain = model(text);
         for meta in registry::effects() {
             for at in channel_sets(&plain, meta) {
@@ -211,7 +212,7 @@ fn every_effect_fits_somewhere_and_its_declaration_reads() {
                 "{simpler}"
             );
         }
-        let reads = [DDMR, AXIS].iter().any(|plant| {
+        let reads = [DDMR, AXIS, TANKS].iter().any(|plant| {
             Model::from_toml("test.toml", &format!("{plant}{}", meta.example)).is_ok()
         });
         assert!(reads, "the example of {} does not read", meta.id);

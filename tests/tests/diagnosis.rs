@@ -149,6 +149,12 @@ fn a_load_behind_a_spring_is_found() {
     finds_under(Experiment::Mixed, Hidden::ElasticCoupling, 0.5, 3);
 }
 
+/// Found with the height of its edge, in levels that stay there.
+#[test]
+fn a_tank_that_runs_over_is_found_with_its_edge() {
+    finds_under(Experiment::Mixed, Hidden::Overflow, 1.0, 601);
+}
+
 /// A dead zone of the driver cannot lie behind the terminals of a motor: where the voltages were measured
 /// there, neither it nor anything else that acts before them is looked for.
 #[test]

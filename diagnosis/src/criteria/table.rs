@@ -137,6 +137,12 @@ criteria! {
         negative: f64 = 0.05 "1", Judgement: "noise about zero";
         /// Time at zero of an input that was not zero before, from which an effect at command zero is tried.
         rests_s: f64 = 0.2 "s", Judgement: "in less a machine hardly slows down";
+        /// Share of the range of a position within which it is at its end.
+        end: f64 = 0.05 "1", Judgement: "a stop gives a little";
+        /// The same within which it is on its way there.
+        end_region: f64 = 0.3 "1", Convention: "several times that";
+        /// Share of the time there, or of the times that it came there, which it must be at its end, so that a stop is tried.
+        stays_at_end: f64 = 0.25 "1", Judgement: "a motion that passes or turns anywhere is there a sixth of the time";
         /// Steepest row of a Jacobian over the median one, beyond which a sign is too sharp for the integrator.
         wild: f64 = 1e4 "1", Judgement: "the derivatives are then useless";
         /// A speed of an effect below this many widths of a smoothed sign cannot be told from the smoothing.

@@ -21,11 +21,12 @@ pub(crate) fn hide(
     size: f64,
 ) -> Result<Concealed, HiddenError> {
     check(effect, size)?;
+    let not_here = HiddenError::NotHere {
+        effect,
+        robot: machine.robot.name(),
+    };
     if !fits(effect, machine.robot) {
-        return Err(HiddenError::NotHere {
-            effect,
-            robot: machine.robot.name(),
-        });
+        return Err(not_here);
     }
     let shafts = match machine.robot {
         Driven::Twil => WHEELS,
@@ -46,6 +47,7 @@ pub(crate) fn hide(
         H::LinearStiffness => effort::spring(machine, concealed),
         H::CubicStiffness => effort::hardening(machine, concealed),
         H::Hysteresis => effort::hysteresis(machine, concealed),
+        H::Overflow => return Err(not_here),
         H::ScrubFriction => body::scrub(machine, concealed),
         H::GravitySlope => body::slope(machine, concealed),
         H::CentrifugalOffset => body::offset(machine, concealed),
@@ -94,6 +96,8 @@ pub(crate) fn largest(effect: Hidden) -> f64 {
         H::CentrifugalOffset => 2.1,
         // The limit would be 0.
         H::InputSaturation => 4.0,
+        // The tank would have no wall.
+        H::Overflow => 4.0,
         // The battery would be empty at the end.
         H::GainDrift => 6.0,
         // The bearings would have less than no friction.

@@ -11,7 +11,12 @@ pub(crate) const SHEET: Sheet = Sheet {
     inputs: 1,
     columns: &["time_s", "pump_V", "level_upper_m", "level_lower_m"],
     command: [4.4, 4.0],
-    shows: &[Hidden::DeadZone, Hidden::InputPower, Hidden::ConstantForce],
+    shows: &[
+        Hidden::DeadZone,
+        Hidden::InputPower,
+        Hidden::ConstantForce,
+        Hidden::Overflow,
+    ],
     build: |phase, _| Box::new(TankPair::new(phase)),
 };
 
@@ -26,14 +31,22 @@ const START: f64 = 0.15;
 /// Voltage at which the pump moves what its data sheet says, V.
 const RATED: f64 = 6.0;
 
+/// Discharge coefficient of a sharp edge.
+const WEIR: f64 = 0.62;
+/// Length of the edge that the upper tank runs over, m.
+const RIM: f64 = 0.4;
+
 /// Two tanks with holes in their bottoms; what leaves the upper one falls into the lower one.
 ///
 /// ```text
-/// volume₁' = pump - out₁        volume₂' = out₁ - out₂ - drawn
+/// volume₁' = pump - out₁ - over        volume₂' = out₁ - out₂ - drawn
 /// pressure = ρ g volume/area    out = hole √(2 pressure/ρ)
 /// ```
 ///
-/// Reference: D. Bernoulli (1738), "Hydrodynamica", section III: the speed of efflux.
+/// Over an edge of the length `L` runs `over = ⅔ 0.62 L √(2 g) (level - edge)^1.5`, out of the apparatus.
+///
+/// References: D. Bernoulli (1738), "Hydrodynamica", section III: the speed of efflux; G. Poleni (1717), "De motu aquae
+/// mixto": the weir.
 #[derive(Clone, Debug)]
 pub(super) struct TankPair {
     /// m²
@@ -46,6 +59,8 @@ pub(super) struct TankPair {
     threshold: f64,
     /// Its flow goes with this power of the voltage.
     exponent: f64,
+    /// Height at which the upper tank runs over, m.
+    edge: f64,
     /// What a dosing pump draws from the lower tank, m³/s.
     drawn: f64,
     sensors: [Scale; 2],
@@ -63,6 +78,7 @@ impl TankPair {
             pump: 1.2e-5,
             threshold: 0.0,
             exponent: 1.0,
+            edge: f64::INFINITY,
             drawn: 0.0,
             sensors: phase.map(|p| Scale::new(RESOLUTION, p)),
             volume: area.map(|a| a * START),
@@ -87,11 +103,18 @@ impl TankPair {
         self.hole[tank] * (2.0 * pressure / 1000.0).sqrt()
     }
 
+    /// What runs over the edge of the upper tank, m³/s.
+    pub(super) fn over(&self, volume: f64) -> f64 {
+        let head = (volume / self.area[0] - self.edge).max(0.0);
+        2.0 / 3.0 * WEIR * RIM * (2.0 * GRAVITY * head).sqrt() * head
+    }
+
     fn step(&mut self) {
         let inflow = self.inflow();
         let end = midpoint(self.volume, STEP, |volume| {
             let [first, second] = [0, 1].map(|i| self.outflow(i, volume[i]));
-            [inflow - first, first - second - self.drawn]
+            let over = self.over(volume[0]);
+            [inflow - first - over, first - second - self.drawn]
         });
         // No tank holds less than nothing.
         self.volume = end.map(|v| v.max(0.0));
@@ -148,6 +171,15 @@ impl Rig for TankPair {
                     )
                     .fitted("force", -self.drawn / self.area[1], "m/s")
                     .physical("drawn", self.drawn, "m^3/s"),
+                )
+            }
+            Hidden::Overflow => {
+                self.edge = 0.36 - 0.08 * of.size;
+                Some(
+                    of.told("an upper tank that runs over its edge", &["tank.upper"])
+                        .fitted("limit", self.edge, "m")
+                        .fitted("edge", WEIR * RIM / self.area[0], "1/m")
+                        .physical("rim", RIM, "m"),
                 )
             }
             _ => None,

@@ -102,6 +102,24 @@ fn the_tanks_come_to_rest_and_lose_no_water() {
     assert!(rig.volume.iter().all(|v| (0.0..1e-9).contains(v)));
 }
 
+/// What does not run out below runs over the edge, which is 28 cm high, and is lost.
+#[test]
+fn a_full_tank_runs_over() {
+    let mut rig = TankPair::new(PHASE);
+    with(&mut rig, Hidden::Overflow);
+    let volts = 8.0;
+    let row = hold(&mut rig, volts, 3000);
+    let over = rig.over(rig.volume[0]);
+    let out = rig.outflow(0, rig.volume[0]);
+    assert!(
+        over > 2e-5 && (0.28..0.284).contains(&row.exact[0]),
+        "{over} {row:?}"
+    );
+    assert!(((out + over) / (1.2e-5 * volts) - 1.0).abs() < 1e-6);
+    // The lower one has what the outlet leaves.
+    assert!((rig.outflow(1, rig.volume[1]) / out - 1.0).abs() < 1e-6);
+}
+
 #[test]
 fn the_arm_hangs_where_the_motor_holds_it() {
     let mut rig = Arm::new(PHASE, 1e-4);
