@@ -291,7 +291,10 @@ fn contest(mut looked: Vec<(usize, Judged)>, criteria: &Criteria) -> Vec<Judged>
         } else {
             criteria.finalists
         };
-        let crowded = siblings.len() >= criteria.finalists_each || finalists.len() >= places;
+        // The simplest explanation is not crowded out by what explains less than the one that contains it.
+        let simplest = best.is_some_and(special);
+        let full = finalists.len() >= places && !simplest;
+        let crowded = siblings.len() >= criteria.finalists_each || full;
         if !again && !needless && !elsewhere && !crowded {
             finalists.push(found.clone());
         }

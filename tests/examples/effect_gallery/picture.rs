@@ -1,6 +1,6 @@
 //! The picture of an effect's symptom.
 
-use loopsight_core::PlaceKind;
+use loopsight_core::{PlaceKind, Shows};
 use loopsight_diagnosis::{
     Comparison, Diagnosis, ForceDependence, Measurements, ResidualForce, RunTrace, Work, compare,
     diagnose, residual_force,
@@ -51,7 +51,9 @@ pub(crate) fn picture(effect: Hidden) -> Option<Picture> {
     let force = residual_force(&right, &runs, &Work::quiet()).ok()?;
     let residual = of_residual(&off.runs[0], furthest_off(&off)?);
     // What stands between the machine and the log is no force.
-    let over = force.as_ref().and_then(of_force);
+    let over = force
+        .as_ref()
+        .and_then(|f| of_force(f, meta.shows == Shows::OneRun));
     let over = over.filter(|_| meta.places[0] != PlaceKind::Output);
     let (over, share) = over.unwrap_or(residual);
     let title = format!("{}: {}", robot.name(), log.truth.hidden.first()?.doc);
@@ -148,9 +150,11 @@ fn stretch(before: &RunTrace, after: &RunTrace, signal: usize) -> FigurePanel {
     }
 }
 
-/// The force over the quantity that tells most of it, and the share it tells; none where nothing tells.
-fn of_force(force: &ResidualForce) -> Option<(MeanOver, f64)> {
-    let most: &ForceDependence = force.depends_on.first()?;
+/// The force over the quantity that tells most of it, and the share it tells; none where nothing tells. Time is one where
+/// the effect `drifts`: what depends on the position looks as if it depended on time, too.
+fn of_force(force: &ResidualForce, drifts: bool) -> Option<(MeanOver, f64)> {
+    let mut quantities = force.depends_on.iter();
+    let most: &ForceDependence = quantities.find(|d| drifts || d.quantity != "time")?;
     (most.share_of_variance > TELLING && !most.curves.is_empty()).then(|| {
         let curves = most.curves.iter().map(|curve| {
             let points = curve.bins.iter().map(|bin| MeanAt {
