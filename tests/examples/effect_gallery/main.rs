@@ -8,6 +8,7 @@
 mod page;
 mod picture;
 
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
@@ -26,39 +27,38 @@ struct Arguments {
     only: Vec<String>,
 }
 
-fn main() {
+type Outcome = Result<(), Box<dyn Error + Send + Sync>>;
+
+fn main() -> Outcome {
     let arguments = Arguments::parse();
-    std::fs::create_dir_all(&arguments.folder).expect("the folder can be made");
+    std::fs::create_dir_all(&arguments.folder)?;
     let wanted = |id: &str| arguments.only.is_empty() || arguments.only.iter().any(|o| o == id);
-    let effects = registry::effects();
-    effects
+    registry::effects()
         .par_iter()
         .filter(|meta| wanted(meta.id))
-        .for_each(|meta| one(&arguments.folder, meta.id));
+        .try_for_each(|meta| one(&arguments.folder, meta.id))?;
     let drawn = |id: &str| id.parse::<Hidden>().is_ok();
-    if arguments.only.is_empty() || arguments.only == ["none"] {
-        save(&arguments.folder.join("README.md"), &page::gallery(&drawn));
+    if arguments.only.is_empty() || wanted("none") {
+        save(&arguments.folder.join("README.md"), &page::gallery(&drawn))?;
     }
+    Ok(())
 }
 
-fn one(folder: &Path, id: &str) {
-    let part = loopsight::explain(id)
-        .expect("it is registered")
-        .parts
-        .remove(0);
+fn one(folder: &Path, id: &str) -> Outcome {
+    let part = loopsight::explain(id)?.parts.remove(0);
     let mut page = page::declared(&part);
     // What no machine hides has no picture.
     if let Ok(hidden) = id.parse::<Hidden>() {
-        let Some(picture) = picture::picture(hidden) else {
-            panic!("{id}: its recording cannot be diagnosed");
-        };
+        let picture = picture::picture(hidden);
+        let picture = picture.ok_or_else(|| format!("{id}: its recording cannot be diagnosed"))?;
         eprintln!("{id}: {}", picture.caption);
-        save(&folder.join(format!("{id}.svg")), &picture.svg);
+        save(&folder.join(format!("{id}.svg")), &picture.svg)?;
         page += &format!("\n![How it shows]({id}.svg)\n\n{}\n", picture.caption);
     }
-    save(&folder.join(format!("{id}.md")), &page);
+    save(&folder.join(format!("{id}.md")), &page)
 }
 
-fn save(file: &Path, text: &str) {
-    output::save(file, text.as_bytes()).expect("the file can be written");
+fn save(file: &Path, text: &str) -> Outcome {
+    output::save(file, text.as_bytes())?;
+    Ok(())
 }
