@@ -102,7 +102,7 @@ criteria! {
     /// Which candidates get a short fit, and which of these a full one.
     search: SearchCriteria {
         /// Most promising starts of all candidates that get a short fit.
-        looks: usize = 36 "1", Judgement: "time: each costs a short fit";
+        looks: usize = 40 "1", Judgement: "time: each costs a short fit";
         /// Most starts of one candidate among them.
         looks_each: usize = 2 "1", Judgement: "an effect with many starts must not crowd the others out";
         /// Candidates that get a full fit.
