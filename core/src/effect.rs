@@ -11,6 +11,8 @@ pub enum Shows {
     NeverNegative,
     /// The input at the channel rests at zero between other values.
     InputAtZero,
+    /// The input at the channel has commands of several sizes.
+    InputSizes,
     /// The position (or head) at the channel stays at one end of where it goes, instead of turning round there.
     AtEnd,
     /// The recording is one run. What changes with time alone does not begin anew with every run, and how long the machine

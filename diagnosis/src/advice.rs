@@ -92,6 +92,7 @@ fn separating(a: &str, b: &str) -> String {
         "input_saturation",
         "input_power",
         "bridge_coast",
+        "pulse_coast",
         "gain_asymmetry",
     ]) {
         "several levels of the input, slow ramps through zero in both directions, and coasting from speed with the input at zero".to_owned()

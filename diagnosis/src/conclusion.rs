@@ -55,6 +55,10 @@ pub struct Explanation {
     /// The effect and where.
     #[serde(flatten)]
     pub place: EffectAt,
+    /// The effect that explains the error together with it, where neither does alone; errors and parameters are those
+    /// with both.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub together_with: Option<EffectAt>,
     /// Free-run error with it, on the validation data.
     pub nrmse: f64,
     /// The effect's parameters, by their ids.

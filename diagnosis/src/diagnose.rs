@@ -18,6 +18,7 @@ use crate::judge::{Losses, nrmse};
 use crate::measurements::Measurements;
 use crate::observer::{Correction, attach_same_observer};
 use crate::output_error::prepare;
+use crate::pairs::pair;
 use crate::prediction::{Solution, signal_rms};
 use crate::problem::Problem;
 use crate::progress::{Cancelled, Stage, Work};
@@ -31,6 +32,8 @@ use crate::where_it_fails::{predictable, where_it_fails};
 
 /// Adds every effect of the library to `model` at every channel it fits, and refits all parameters each time.
 /// Each is judged by its free run on validation data.
+///
+/// Where no effect explains what the model does not, the best of them are tried in pairs.
 ///
 /// The search reads windows of a long log; everything that was measured has the last word.
 ///
@@ -49,7 +52,13 @@ pub fn diagnose(
         least: work.criteria().missing.least_share,
         discover: Discover::Never,
     };
-    diagnose_for(model, measurements, aim, work)
+    let mut diagnosis = diagnose_for(model, measurements, aim, work)?;
+    match pair(&diagnosis, measurements, aim, work) {
+        Ok(Some(pair)) => diagnosis.lacks(&pair),
+        Ok(None) => {}
+        Err(Cancelled) => diagnosis.verdict = Conclusion::Cancelled,
+    }
+    Ok(diagnosis)
 }
 
 /// What a diagnosis is for.

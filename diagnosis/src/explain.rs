@@ -31,6 +31,7 @@ pub(crate) fn explain(
     )?;
     Ok(Explanation {
         place: place(candidate),
+        together_with: None,
         nrmse: nrmse(&judged.losses),
         parameters: parameters(candidate, &fit.parameters),
         significance: significance.min(MOST),
@@ -50,6 +51,7 @@ pub(crate) fn explain_look(judged: &Judged) -> Explanation {
     let fit = Fit::cancelled(model, Method::OutputError, f64::NAN, 0);
     Explanation {
         place: place(candidate),
+        together_with: None,
         nrmse: nrmse(&judged.losses),
         parameters: parameters(candidate, &fit.parameters),
         significance: f64::NAN,

@@ -8,8 +8,11 @@ use crate::fit::fit;
 use crate::fitted::Fit;
 use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
+use crate::pairs::pair;
 use crate::progress::{Cancelled, Work};
-use crate::refine::{blurs, is_undetermined, refine, still_open, take_values, without_step};
+use crate::refine::{
+    blurs, is_undetermined, refine, renames, still_open, take_values, without_step,
+};
 use crate::settings::{FitSettings, ImproveSettings, Method};
 use loopsight_model::model::Model;
 
@@ -53,16 +56,38 @@ fn improve_with(
     work: &Work<'_>,
 ) -> Result<Improvement, FitError> {
     let mut state = State::new(model, discover);
+    // The diagnosis of the next round, where it is known already.
+    let mut known = None;
     let verdict = loop {
-        let diagnosis = match state.diagnose(measurements, work) {
-            // A step with which the free run diverges was none.
-            Err(error) if is_divergence(&error) && state.take_back() => {
-                break Conclusion::UnknownEffect;
-            }
-            done => done?,
+        let mut diagnosis = match known.take() {
+            Some(diagnosis) => diagnosis,
+            None => match state.diagnose(measurements, work) {
+                // A step with which the free run diverges was none.
+                Err(error) if is_divergence(&error) && state.take_back() => {
+                    break Conclusion::UnknownEffect;
+                }
+                done => done?,
+            },
         };
         let verdict = diagnosis.verdict;
         let round = state.diagnoses.len();
+        // Beside an effect that was found, a further one is judged alone.
+        if round == 0 {
+            match pair(&diagnosis, measurements, state.aim(work), &work.in_round(1)) {
+                Ok(None) => {}
+                Ok(Some(pair)) => {
+                    diagnosis.lacks(&pair);
+                    state.diagnoses.push(diagnosis);
+                    state.step(pair.first, round);
+                    known = Some(pair.second);
+                    continue;
+                }
+                Err(Cancelled) => {
+                    state.diagnoses.push(diagnosis);
+                    break Conclusion::Cancelled;
+                }
+            }
+        }
         let next = match (&diagnosis.missing, diagnosis.candidates.first()) {
             (Some(_), Some(best)) if round < work.criteria().improve.most => Some(best.clone()),
             _ => None,
@@ -71,8 +96,10 @@ fn improve_with(
         let Some(best) = next else { break verdict };
         match state.add(best, round, measurements, work) {
             Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
+            // It is another name for what the model has. What it would gain is still missing.
+            Ok(false) => break Conclusion::UnknownEffect,
             done => done?,
-        }
+        };
     };
     state.finish(verdict, measurements, work)
 }
@@ -104,6 +131,17 @@ impl State {
         }
     }
 
+    /// What the next diagnosis is for.
+    fn aim(&self, work: &Work<'_>) -> Aim {
+        let first = self.diagnoses.first().map(|d| d.nominal.nrmse);
+        let criteria = work.criteria();
+        let (worth, least) = (criteria.improve.worth, criteria.missing.least_share);
+        Aim {
+            least: first.map_or(least, |nrmse| (worth * nrmse).max(least)),
+            discover: self.discover,
+        }
+    }
+
     /// Diagnoses the present model. The first diagnosis also fits it, and that fit is the first step.
     fn diagnose(
         &mut self,
@@ -111,14 +149,7 @@ impl State {
         work: &Work<'_>,
     ) -> Result<Diagnosis, FitError> {
         let round = self.diagnoses.len();
-        let first = self.diagnoses.first().map(|d| d.nominal.nrmse);
-        let criteria = work.criteria();
-        let (worth, least) = (criteria.improve.worth, criteria.missing.least_share);
-        let least = first.map_or(least, |nrmse| (worth * nrmse).max(least));
-        let aim = Aim {
-            least,
-            discover: self.discover,
-        };
+        let aim = self.aim(work);
         let diagnosis = diagnose_for(&self.present, measurements, aim, &work.in_round(round))?;
         if let Some(fitted) = &diagnosis.model
             && self.steps.is_empty()
@@ -136,14 +167,8 @@ impl State {
         Ok(diagnosis)
     }
 
-    /// Adds what the diagnosis of a `round` named, and corrects earlier steps where that changes them.
-    fn add(
-        &mut self,
-        best: Explanation,
-        round: usize,
-        measurements: &Measurements<'_>,
-        work: &Work<'_>,
-    ) -> Result<(), FitError> {
+    /// Adds what the diagnosis of a `round` named.
+    fn step(&mut self, best: Explanation, round: usize) {
         self.steps.push(ImprovementStep {
             added: Some(best.place),
             entries: best.entries,
@@ -153,15 +178,30 @@ impl State {
             still_open: Vec::new(),
         });
         self.before = Some(std::mem::replace(&mut self.present, best.model));
-        let earlier = &self.diagnoses[..round];
+    }
+
+    /// Adds what the diagnosis of a `round` named, and corrects earlier steps where that changes them. Whether it stays.
+    fn add(
+        &mut self,
+        best: Explanation,
+        round: usize,
+        measurements: &Measurements<'_>,
+        work: &Work<'_>,
+    ) -> Result<bool, FitError> {
+        self.step(best, round);
         let work = work.in_round(round);
+        if renames(&self.present, &self.steps, measurements, &work)? && self.take_back() {
+            return Ok(false);
+        }
+        let earlier = &self.diagnoses[..round];
         refine(
             &mut self.present,
             &mut self.steps,
             earlier,
             measurements,
             &work,
-        )
+        )?;
+        Ok(true)
     }
 
     /// Says of each step what the data still cannot tell from its effect in the finished `model`.

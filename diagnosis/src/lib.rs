@@ -100,6 +100,7 @@ mod motion;
 mod noise;
 mod observer;
 mod output_error;
+mod pairs;
 mod positions;
 mod prediction;
 mod problem;

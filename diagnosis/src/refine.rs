@@ -44,19 +44,52 @@ pub(crate) fn refine(
     sharpened(&mut best)
 }
 
+/// Whether the last of `steps` is no more than another name for an earlier one: without that one the error is the same,
+/// and the last step hardly lowered it. What else is missing may decide between the two then, so the earlier one stays.
+pub(crate) fn renames(
+    model: &Model,
+    steps: &[ImprovementStep],
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<bool, FitError> {
+    let [.., before, last] = steps else {
+        return Ok(false);
+    };
+    if last.nrmse_test < work.criteria().improve.better * before.nrmse_test {
+        return Ok(false);
+    }
+    let mut model = model.clone();
+    let mut best = Refined {
+        model: &mut model,
+        error: None,
+        measurements,
+        work,
+        changes: 0,
+    };
+    let close = best.work.criteria().choice.close;
+    let candidates = spared(&best, steps);
+    Ok(best.takes(candidates, close)?.is_some())
+}
+
+/// The models without one of the earlier steps' effects, by the index of the step.
+fn spared(best: &Refined<'_>, steps: &[ImprovementStep]) -> Vec<(usize, Model)> {
+    // The last effect was just found missing, so it stays.
+    let earlier = steps.iter().enumerate().take(steps.len().saturating_sub(1));
+    let models = earlier.filter_map(|(index, step)| {
+        let instances = instances(best.model, step.added.as_ref()?);
+        instances.first()?;
+        Some((index, without(best.model, &instances)?))
+    });
+    models.collect()
+}
+
 /// Removes effects of earlier steps without which the error is the same: what looked like a dead zone may have
 /// been part of the friction that was added after it.
 fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<(), FitError> {
     let close = best.work.criteria().choice.close;
     loop {
-        // The last effect was just found missing, so it stays.
-        let earlier = steps.iter().enumerate().take(steps.len().saturating_sub(1));
-        let candidates = earlier.filter_map(|(index, step)| {
-            let instances = instances(best.model, step.added.as_ref()?);
-            instances.first()?;
-            Some((index, without(best.model, &instances)?))
-        });
-        match best.takes(candidates.collect(), close)? {
+        let candidates = spared(best, steps);
+        match best.takes(candidates, close)? {
             Some(index) => drop(steps.remove(index)),
             None => return Ok(()),
         }

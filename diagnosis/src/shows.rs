@@ -9,6 +9,9 @@ use crate::ends::{Ends, limited};
 
 /// Share of the largest command below which a command counts as zero.
 const ZERO: f64 = 1e-3;
+/// Least deviation of the commands' sizes from their mean, as a share of their root mean square: what is in proportion
+/// to the size changes by a hundredth then.
+const SIZES: f64 = 0.01;
 
 /// Whether an effect at the channels `at` can show in `runs`. A candidate that cannot is not tried, so that the cost of
 /// a diagnosis does not grow with every effect of the library. `ends` are those of the plant's signals.
@@ -30,6 +33,7 @@ pub(crate) fn can_show(
         Shows::OneRun => runs.len() == 1,
         Shows::OneMass => masses(model) == 1,
         Shows::InputAtZero => channels.any(|c| rests(c, runs, criteria.rests_s)),
+        Shows::InputSizes => channels.any(|c| has_sizes(c, runs)),
         Shows::AtEnd => channels.any(|c| {
             let ends = limited(model, c).and_then(|signal| ends.get(signal));
             ends.is_some_and(|ends| ends.iter().any(Option::is_some))
@@ -60,6 +64,7 @@ pub(crate) fn what_is_absent(
         Shows::NeverNegative => "what is measured goes below zero",
         Shows::OneRun => "the recording has several runs",
         Shows::AtEnd => "no level stays at the end of where it goes",
+        Shows::InputSizes => "the commands all have one size",
         Shows::InputAtZero => "no input rests at zero between other values",
     })
 }
@@ -106,6 +111,21 @@ fn rests(channel: &Channel, runs: &[Run], least: f64) -> bool {
             .sum::<f64>()
     };
     largest > 0.0 && runs.iter().map(resting).sum::<f64>() >= least
+}
+
+/// Whether the commands of the input at a channel have several sizes.
+fn has_sizes(channel: &Channel, runs: &[Run]) -> bool {
+    let Place::Input(input) = channel.place else {
+        return false;
+    };
+    let sizes = runs.iter().flat_map(|run| values(run, input)).map(f64::abs);
+    let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for size in sizes.filter(|size| size.is_finite()) {
+        n += 1.0;
+        sum += size;
+        squares += size * size;
+    }
+    squares * n - sum * sum > SIZES * SIZES * squares * n
 }
 
 /// The values of an input, sample by sample.
@@ -174,6 +194,15 @@ mod tests {
         assert!(!coasts(|t| if t < 3.9 { 5.0 } else { 0.0 }), "too short");
         assert!(!coasts(|t| 5.0 * (3.0 * t + 0.1).sin()), "in passing");
         assert!(!coasts(|_| 0.0));
+    }
+
+    #[test]
+    fn what_goes_with_the_size_of_the_command_shows_in_several_sizes() {
+        let sizes = |input| shows(Shows::InputSizes, "input", input, |t| t);
+        assert!(!sizes(|t| if t % 1.0 < 0.5 { 5.0 } else { -5.0 }));
+        assert!(!sizes(|_| 0.0));
+        assert!(sizes(|t| if t < 2.0 { 5.0 } else { 4.0 }));
+        assert!(sizes(|t| 5.0 * (3.0 * t).sin()));
     }
 
     #[test]

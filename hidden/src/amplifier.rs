@@ -30,6 +30,17 @@ pub(crate) struct AmplifierParts {
     pub(crate) offset: f64,
     /// At command zero all switches of the bridge are open.
     pub(crate) coasts: bool,
+    /// The switches are closed in pulses only, and open in the pauses between them.
+    pub(crate) pulses: Option<Pulses>,
+}
+
+/// Pulses of the whole supply, for as long as their mean is the voltage demanded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pulses {
+    /// The supply, V.
+    pub(crate) supply: f64,
+    /// Of one pulse and its pause, in integration steps.
+    pub(crate) period: u32,
 }
 
 impl Default for AmplifierParts {
@@ -44,6 +55,7 @@ impl Default for AmplifierParts {
             gain: 1.0,
             offset: 0.0,
             coasts: false,
+            pulses: None,
         }
     }
 }
@@ -51,10 +63,10 @@ impl Default for AmplifierParts {
 /// What an amplifier does over a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Demand {
-    /// Mean voltage demanded, V.
+    /// Mean voltage demanded while the switches are closed, V.
     pub(crate) voltage: f64,
-    /// All switches are open: the winding is connected to nothing but the diodes of the bridge.
-    pub(crate) open: bool,
+    /// Share of the step in which they are closed. Open, the winding is connected to nothing but the diodes of the bridge.
+    pub(crate) on: f64,
 }
 
 /// An amplifier at work.
@@ -66,6 +78,8 @@ pub(crate) struct Amplifier {
     /// Of the filter over a step: what remains of the difference at the end, and on average.
     decay: f64,
     mean: f64,
+    /// Steps since the last pulse began.
+    passed: u32,
 }
 
 impl Amplifier {
@@ -82,6 +96,7 @@ impl Amplifier {
             filtered: 0.0,
             decay,
             mean,
+            passed: 0,
         }
     }
 
@@ -100,10 +115,17 @@ impl Amplifier {
         } else {
             (parts.full * (live.abs() / parts.full).powf(parts.exponent)).copysign(live)
         };
-        Demand {
-            voltage: parts.gain * curved.clamp(-parts.limit, parts.limit) + parts.offset,
-            open: parts.coasts && late == 0.0,
+        let voltage = parts.gain * curved.clamp(-parts.limit, parts.limit) + parts.offset;
+        if let Some(pulses) = parts.pulses {
+            let lasts = (voltage.abs() / pulses.supply).min(1.0) * f64::from(pulses.period);
+            let on = (lasts - f64::from(self.passed)).clamp(0.0, 1.0);
+            self.passed = (self.passed + 1) % pulses.period;
+            let voltage = pulses.supply.copysign(voltage);
+            return Demand { voltage, on };
         }
+        let open = parts.coasts && late == 0.0;
+        let on = if open { 0.0 } else { 1.0 };
+        Demand { voltage, on }
     }
 }
 
@@ -157,10 +179,21 @@ mod tests {
             },
             1e-3,
         );
-        assert_eq!(
-            [0.0, 1.0, 0.0].map(|v| loose.step(v).open),
-            [true, false, true]
+        assert_eq!([0.0, 1.0, 0.0].map(|v| loose.step(v).on), [0.0, 1.0, 0.0]);
+        let mut pulsed = Amplifier::new(
+            AmplifierParts {
+                pulses: Some(Pulses {
+                    supply: 12.0,
+                    period: 4,
+                }),
+                ..AmplifierParts::default()
+            },
+            1e-3,
         );
+        let pulse: Vec<Demand> = (0..5).map(|_| pulsed.step(-4.5)).collect();
+        assert!(pulse.iter().all(|demand| demand.voltage == -12.0));
+        let on: Vec<f64> = pulse.iter().map(|demand| demand.on).collect();
+        assert_eq!(on, [1.0, 0.5, 0.0, 0.0, 1.0], "three eighths of four steps");
         let mut slow = Amplifier::new(
             AmplifierParts {
                 lag: 0.05,

@@ -77,6 +77,7 @@ effects! {
     InputLead "input_lead" Twil "commands that the log writes down after they were sent",
     ActuatorLag "actuator_lag" Twil "a filter before both amplifiers",
     BridgeCoast "bridge_coast" Twil "motor drivers that let go of the motors at command zero",
+    PulseCoast "pulse_coast" Twil "motor drivers that let go of the motors in the pauses of their pulses",
     InputOffset "input_offset" Twil "a bias on the right amplifier",
     GainAsymmetry "gain_asymmetry" Twil "right amplifier stronger, left one weaker",
     GainDrift "gain_drift" Twil "a battery that runs down under what else is on board",

@@ -68,8 +68,8 @@ pub(crate) struct Machine {
     grips: Grips,
     windings: [Winding; 2],
     amplifiers: [Amplifier; 2],
-    /// Bridges whose switches are open in this step.
-    open: [bool; 2],
+    /// Share of this step in which the switches of the bridges are closed.
+    on: [f64; 2],
     velocities: Velocities,
     /// Angles of the wheels where the encoders sit. With slip: of measuring wheels that roll.
     angles: [f64; 2],
@@ -100,7 +100,7 @@ impl Machine {
             grips: Grips::default(),
             windings: [winding; 2],
             amplifiers,
-            open: [false; 2],
+            on: [1.0; 2],
             velocities: Velocities::default(),
             angles: [0.0; 2],
             wheel_angles: [0.0; 2],
@@ -180,7 +180,7 @@ impl Machine {
         for k in 0..self.drives {
             let demand = self.amplifiers[k].step(commands[k]);
             demanded[k] = demand.voltage;
-            self.open[k] = demand.open;
+            self.on[k] = demand.on;
         }
         let currents = self.windings.map(|w| w.current);
         let voltages = {
@@ -227,11 +227,8 @@ impl Machine {
             } else {
                 wheel
             };
-            let (driven, current) = if self.open[k] {
-                self.windings[k].coasting(physics.battery.open_circuit, rotor)
-            } else {
-                self.windings[k].torque(voltages[k], rotor)
-            };
+            let supply = physics.battery.open_circuit;
+            let (driven, current) = self.windings[k].pulsed(self.on[k], voltages[k], supply, rotor);
             currents[k] = current;
             let mut torque = match physics.gap {
                 None => driven,

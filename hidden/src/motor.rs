@@ -103,6 +103,30 @@ impl Winding {
         (torque / motor.gear_ratio, end)
     }
 
+    /// As [`Winding::torque`] with the switches closed for the first share `on` of the step, and open after it.
+    pub(crate) fn pulsed(&self, on: f64, voltage: f64, supply: f64, speed: f64) -> (f64, f64) {
+        if on >= 1.0 {
+            return self.torque(voltage, speed);
+        }
+        if on <= 0.0 {
+            return self.coasting(supply, speed);
+        }
+        let (first, current) = self.over(on, self.current).torque(voltage, speed);
+        let (rest, end) = self.over(1.0 - on, current).coasting(supply, speed);
+        (on * first + (1.0 - on) * rest, end)
+    }
+
+    /// The winding over a share of its step, with this current at the start.
+    fn over(&self, share: f64, current: f64) -> Self {
+        let mut part = Self {
+            step: share * self.step,
+            current,
+            ..*self
+        };
+        part.tabulate();
+        part
+    }
+
     /// Takes over the current at the end of a step.
     pub(crate) fn advance(&mut self, current: f64) {
         self.lost += self.resistance * current * current * self.step;
@@ -198,6 +222,24 @@ mod tests {
         let friction = -motor.rotor_friction * 3.0 / motor.gear_ratio.powi(2);
         assert_eq!(end, 0.0);
         assert!((torque / friction - 1.0).abs() < 1e-12);
+    }
+
+    /// A step of a pulse and a pause is the two one after the other.
+    #[test]
+    fn a_pulse_ends_within_a_step() {
+        let motor = Driven::Twil.parts().0;
+        let whole = Winding::new(motor, None, 1e-4);
+        let (torque, end) = whole.pulsed(0.3, 12.0, 12.0, 2.0);
+        let mut fine = Winding::new(motor, None, 1e-6);
+        let mut mean = 0.0;
+        for k in 0..100 {
+            let on = if k < 30 { 1.0 } else { 0.0 };
+            let (part, current) = fine.pulsed(on, 12.0, 12.0, 2.0);
+            mean += 0.01 * part;
+            fine.advance(current);
+        }
+        assert!((torque - mean).abs() < 1e-9 * mean.abs(), "{torque} {mean}");
+        assert!((end - fine.current).abs() < 1e-9);
     }
 
     #[test]

@@ -107,8 +107,10 @@ impl Robot {
     /// [`Experiment::MultiLevel`].
     pub fn lesson(self, hidden: Option<Hidden>) -> Experiment {
         match (self.kind(), hidden) {
-            // A pseudo-random binary sequence never rests at zero, where alone it shows.
-            (_, Some(Hidden::BridgeCoast)) | (Kind::Rig(_), _) => Experiment::Mixed,
+            // A pseudo-random binary sequence never rests at zero and has one size.
+            (_, Some(Hidden::BridgeCoast | Hidden::PulseCoast)) | (Kind::Rig(_), _) => {
+                Experiment::Mixed
+            }
             (Kind::Driven(_), _) => Experiment::Prbs,
         }
     }

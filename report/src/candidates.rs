@@ -86,6 +86,9 @@ fn row(
         .iter()
         .map(|(name, e)| format!("<span>{}</span>", in_short(name, e)))
         .collect();
+    let both = || std::iter::once(&explanation.place).chain(&explanation.together_with);
+    let effects: Vec<&str> = both().map(|place| place.effect.as_str()).collect();
+    let places: Vec<String> = both().map(|place| place.at.join(", ")).collect();
     let open = if at == 0 && believed.is_some() {
         " open"
     } else {
@@ -96,8 +99,8 @@ fn row(
          <span class=\"soft\">{}</span></span>{}<span class=\"amount\"><b>{}</b><br>\
          <span class=\"soft\">significance {}</span></span>\
          <span class=\"short\">{}</span></summary>{}</details>\n",
-        identifier(&explanation.place.effect),
-        identifier(&explanation.place.at.join(", ")),
+        identifier(&effects.join(" + ")),
+        identifier(&places.join(" + ")),
         scale.bar(&[(bar, explanation.nrmse)]),
         text(&error(explanation.nrmse)),
         text(&significance(explanation.significance)),

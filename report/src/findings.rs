@@ -55,6 +55,7 @@ fn explanation(place: EffectAt, nrmse: f64, name: &str) -> Explanation {
     Explanation {
         entries: None,
         place,
+        together_with: None,
         nrmse,
         parameters: BTreeMap::from([(name.to_owned(), estimate)]),
         significance: 41.0,

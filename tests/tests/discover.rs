@@ -1,11 +1,14 @@
-//! `improve` with [`ImproveSettings::discover`]: what no effect of the library is, found as an expression.
+//! `improve` where no effect of the library helps alone: with [`ImproveSettings::discover`] an expression does, and else
+//! two effects together.
 
 #![allow(
     clippy::unwrap_used,
     reason = "helpers of tests: a failure is the test's failure"
 )]
 
-use loopsight_diagnosis::{Conclusion, ImproveSettings, Improvement, Measurements, Work, improve};
+use loopsight_diagnosis::{
+    Conclusion, ImproveSettings, Improvement, Measurements, Work, diagnose, improve,
+};
 use loopsight_model::excitation::{Excitation, Sequence};
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
@@ -20,6 +23,8 @@ type Rates = fn(time: f64, u: &[f64], x: &[f64]) -> Vec<f64>;
 /// A machine from first principles, and the model that lacks something.
 struct Machine {
     inputs: &'static [&'static str],
+    /// Mean of the commands, and how far they go from it.
+    commands: [f64; 2],
     states: usize,
     /// Which states are measured, and the standard deviation of the noise.
     measured: &'static [usize],
@@ -34,7 +39,7 @@ fn record(machine: &Machine, seconds: f64, seed: u64) -> Run {
         .zip(machine.inputs)
         .map(|(i, name)| {
             let levels = Excitation::MultiLevel {
-                amplitude: 9.0,
+                amplitude: machine.commands[1],
                 hold_s: 0.5,
                 levels: 7,
                 seed: seed + i,
@@ -49,7 +54,10 @@ fn record(machine: &Machine, seconds: f64, seed: u64) -> Run {
     let mut run = Run::empty(machine.inputs.len(), machine.measured.len());
     for k in 0..=(seconds / PERIOD) as usize {
         let time = PERIOD * k as f64;
-        let u: Vec<f64> = commands.iter().map(|c| c.sample(time)).collect();
+        let commands = commands.iter();
+        let u: Vec<f64> = commands
+            .map(|c| machine.commands[0] + c.sample(time))
+            .collect();
         let measured = machine.measured.iter();
         let y: Vec<f64> = measured.map(|i| x[*i] + machine.noise * noise()).collect();
         run.push(time, &u, &y).unwrap();
@@ -119,6 +127,7 @@ const AXIS: &str = "[plant.dc_axis]\n[log.measured]\nspeed = { column = \"speed\
 fn the_curve_of_an_amplifier_is_found() {
     let machine = Machine {
         inputs: &["voltage"],
+        commands: [0.0, 9.0],
         states: 1,
         measured: &[0],
         noise: 0.02,
@@ -135,6 +144,7 @@ fn the_curve_of_an_amplifier_is_found() {
 fn a_load_that_grows_with_time_is_found() {
     let machine = Machine {
         inputs: &["voltage"],
+        commands: [0.0, 9.0],
         states: 1,
         measured: &[0],
         noise: 0.02,
@@ -152,6 +162,7 @@ fn a_load_that_grows_with_time_is_found() {
 fn a_resistance_that_grows_with_time_is_known() {
     let machine = Machine {
         inputs: &["voltage"],
+        commands: [0.0, 9.0],
         states: 1,
         measured: &[0],
         noise: 0.02,
@@ -174,11 +185,49 @@ fn a_resistance_that_grows_with_time_is_known() {
     }
 }
 
+/// A driver on 5 V that lets go of the motor in the pauses of its pulses, and dry friction behind it. Without friction the
+/// driver's motor comes to one speed whatever the command is, and friction alone makes the middle commands worse.
+#[test]
+fn friction_behind_a_driver_that_coasts_is_found_with_it() {
+    let machine = Machine {
+        inputs: &["voltage"],
+        commands: [3.6, 1.0],
+        states: 1,
+        measured: &[0],
+        noise: 0.02,
+        rates: |_, u, x| {
+            let friction = 1.8 * (x[0] / 0.05).tanh();
+            vec![30.0 * (u[0] - friction) - 10.0 * x[0] * u[0] / 5.0]
+        },
+        model: AXIS,
+    };
+    let model = Model::from_toml("machine", machine.model).unwrap().0;
+    let log = record(&machine, 30.0, 1);
+    let measurements = Measurements::new(std::slice::from_ref(&log));
+    let found = diagnose(&model, &measurements, &Work::quiet()).unwrap();
+    let best = &found.candidates[0];
+    let both = [Some(&best.place), best.together_with.as_ref()];
+    let both = both.map(|place| place.map_or("", |p| p.effect.as_str()));
+    assert!(both[0].ends_with("_friction"), "{both:?}");
+    assert_eq!(both[1], "pulse_coast");
+    assert_eq!(found.missing.as_ref(), Some(&best.place));
+    let settings = ImproveSettings::default();
+    let improved = improve(&model, &measurements, &settings, &Work::quiet()).unwrap();
+    let added = improved.steps.iter().filter_map(|s| s.added.as_ref());
+    let added: Vec<&str> = added.map(|a| a.effect.as_str()).collect();
+    assert!(added[0].ends_with("_friction"), "{added:?}");
+    assert_eq!(added[1..], ["pulse_coast"]);
+    assert_eq!(improved.verdict, Conclusion::NothingMissing);
+    let gain = improved.best.as_ref().unwrap().parameters["K_C"].value;
+    assert!((gain - 30.0).abs() < 1.0, "{gain}");
+}
+
 /// Two sledges on springs. The force on the first is in proportion to both positions.
 #[test]
 fn a_force_that_depends_on_two_positions_is_found() {
     let machine = Machine {
         inputs: &["f1", "f2"],
+        commands: [0.0, 9.0],
         states: 4,
         measured: &[1, 3],
         noise: 5e-4,

@@ -260,3 +260,25 @@ fn an_aeropendulum_has_a_fan_with_a_lag_and_friction() {
     assert!((1.9..2.1).contains(&exponent), "{exponent}");
     assert!(found.last() < 0.10, "{:?}", found.unseen);
 }
+
+/// A motor whose driver lets go in the pauses of its pulses, with friction, that warms up: no effect explains it alone. The
+/// friction falls as it warms up; a gain that grows does as well.
+#[test]
+#[ignore = "minutes: run in release"]
+fn a_teaching_board_has_friction_a_driver_that_coasts_and_a_drift() {
+    let log = "lab/dc-motor-aprbs.mat";
+    let Some(found) = improved(Some("teaching_board.toml"), &[log]) else {
+        return;
+    };
+    assert_eq!(found.added[..2], ["coulomb_friction", "pulse_coast"]);
+    let drifts = ["gain_drift", "friction_drift"];
+    assert!(
+        drifts.contains(&found.added[2].as_str()),
+        "{:?}",
+        found.added
+    );
+    // On average over the damping of a motor that is driven all the time.
+    let friction = found.friction();
+    assert!((1.8..2.3).contains(&friction), "{friction} V");
+    assert!(found.last() < 0.105, "{:?}", found.unseen);
+}

@@ -189,6 +189,14 @@ criteria! {
         above_floor: f64 = 1.5 "floors", Judgement: "the floor itself is an estimate, and a model is never exactly the machine";
     }
 
+    /// Two effects at once, where none explains the error alone.
+    pairs: PairCriteria {
+        /// Most effects that are taken for granted, one after the other.
+        firsts: usize = 2 "1", Judgement: "each costs as much as the diagnosis";
+        /// How far the parameters of such an effect must be from no influence.
+        significant: f64 = 2.0 "standard errors", Convention: "95 %; the second effect must then be as sure as any";
+    }
+
     /// Which effects stay while effects are added one after the other.
     improve: ImproveCriteria {
         /// Share of the first error that a further effect must explain.

@@ -1,7 +1,8 @@
 //! Effects between command and motor torque: amplifiers, battery, windings.
 
-use crate::amplifier::AmplifierParts;
+use crate::amplifier::{AmplifierParts, Pulses};
 use crate::driven::Driven;
+use crate::driven::Motor;
 use crate::experiment::PERIOD;
 use crate::motor::{COPPER, Heat};
 use crate::physics::Physics;
@@ -72,18 +73,38 @@ pub(super) fn lag(m: &mut Physics, mut of: Concealed) -> Concealed {
 /// more friction in its bearings: driven it is the same machine, but less of its damping is electrical.
 pub(super) fn coast(m: &mut Physics, mut of: Concealed) -> Concealed {
     each(m, &mut of, |a| a.coasts = true);
-    let motor = &mut m.motor;
-    let braking = motor.torque_constant * motor.back_emf_constant / motor.resistance;
-    let damping = braking + motor.rotor_friction;
-    motor.torque_constant *= of.size;
-    motor.back_emf_constant *= of.size;
-    motor.resistance *= of.size;
-    motor.inductance *= of.size;
-    motor.rotor_friction = damping - of.size * braking;
-    let friction = motor.rotor_friction;
-    let share = of.size * braking / damping;
+    let share = weaken(&mut m.motor, of.size);
+    let friction = m.motor.rotor_friction;
     of.fitted("share", share, "1")
         .physical("rotor_friction", friction, "N m s/rad")
+}
+
+/// Pulses of 500 Hz on the enable pins: in the pauses all switches are open. Below a size of 1 the motor is weaker, as
+/// for [`coast`]. The current runs on for a while after each pulse.
+pub(super) fn pulses(m: &mut Physics, mut of: Concealed) -> Concealed {
+    let supply = m.battery.open_circuit;
+    each(m, &mut of, |a| {
+        a.pulses = Some(Pulses { supply, period: 20 })
+    });
+    let share = weaken(&mut m.motor, of.size);
+    let friction = m.motor.rotor_friction;
+    of.approximate = true;
+    of.fitted("share", share, "1")
+        .physical("reference", supply, "V")
+        .physical("rotor_friction", friction, "N m s/rad")
+}
+
+/// Gives a motor weaker magnets, fewer turns and more friction in its bearings: driven it is the same machine, but only
+/// `size` times as much of its damping is electrical. That share.
+fn weaken(motor: &mut Motor, size: f64) -> f64 {
+    let braking = motor.torque_constant * motor.back_emf_constant / motor.resistance;
+    let damping = braking + motor.rotor_friction;
+    motor.torque_constant *= size;
+    motor.back_emf_constant *= size;
+    motor.resistance *= size;
+    motor.inductance *= size;
+    motor.rotor_friction = damping - size * braking;
+    size * braking / damping
 }
 
 /// 0.6 V too much on one motor.

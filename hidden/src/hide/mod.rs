@@ -61,6 +61,7 @@ pub(crate) fn hide(
         H::InputLead => input::logged_late(machine, concealed),
         H::ActuatorLag => input::lag(machine, concealed),
         H::BridgeCoast => input::coast(machine, concealed),
+        H::PulseCoast => input::pulses(machine, concealed),
         H::InputOffset => input::offset(machine, concealed),
         H::GainAsymmetry => input::asymmetry(machine, concealed),
         H::GainDrift => input::discharge(machine, concealed),
@@ -101,7 +102,7 @@ pub(crate) fn largest(effect: Hidden) -> f64 {
         // The battery would be empty at the end.
         H::GainDrift => 6.0,
         // The bearings would have less than no friction.
-        H::BridgeCoast => 1.0,
+        H::BridgeCoast | H::PulseCoast => 1.0,
         _ => 10.0,
     }
 }

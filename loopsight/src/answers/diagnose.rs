@@ -77,6 +77,10 @@ pub struct Candidate {
     /// The effect and where.
     #[serde(flatten)]
     pub place: EffectAt,
+    /// The effect that explains the error together with it, where neither does alone; errors and parameters are those
+    /// with both.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub together_with: Option<EffectAt>,
     /// Free-run error with it, on the validation data.
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub nrmse: f64,
@@ -115,6 +119,7 @@ impl From<&Explanation> for Candidate {
     fn from(explanation: &Explanation) -> Self {
         Self {
             place: (&explanation.place).into(),
+            together_with: explanation.together_with.as_ref().map(Into::into),
             nrmse: explanation.nrmse,
             parameters: estimates(&explanation.parameters),
             significance: explanation.significance,

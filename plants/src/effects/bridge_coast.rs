@@ -22,7 +22,7 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 ///
 /// Assumptions: the current through the diodes ends at once; the back-emf stays below the supply, so that they do
 /// not conduct again. A bridge that also coasts in the pauses of its pulses does not hold a speed in proportion to
-/// its command, which this effect does not describe.
+/// its command: that is `pulse_coast`.
 ///
 /// A log that is never at zero while the motor turns does not show it.
 ///

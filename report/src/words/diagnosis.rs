@@ -79,10 +79,19 @@ fn effect_missing(diagnosis: &Diagnosis) -> (String, Vec<String>) {
     if !what.is_empty() {
         because.push(format!("That is: {what}."));
     }
+    let second = found(diagnosis).and_then(|best| best.together_with.as_ref());
+    if let Some(second) = second {
+        let what = what_it_is(&second.effect);
+        if !what.is_empty() {
+            because.push(format!("And: {what}."));
+        }
+        because.push("Neither explains the error alone.".to_owned());
+    }
     if let Some(best) = found(diagnosis) {
         because.push(format!(
-            "With it the free-run error falls from {} to {}, on data that the model was not fitted to. \
+            "With {} the free-run error falls from {} to {}, on data that the model was not fitted to. \
              Noise and resolution alone would leave {}.",
+            if second.is_some() { "both" } else { "it" },
             error(diagnosis.nominal.nrmse),
             error(best.nrmse),
             error(diagnosis.floor.nrmse)
@@ -90,13 +99,16 @@ fn effect_missing(diagnosis: &Diagnosis) -> (String, Vec<String>) {
     }
     // The conclusion calls an error above half as much again too large for noise.
     let far = |best: &Explanation| best.nrmse > PART * diagnosis.floor.nrmse;
-    let headline = if found(diagnosis).is_some_and(far) {
-        format!(
-            "The model lacks {}, which explains part of the error.",
-            place(missing)
-        )
-    } else {
-        format!("The model lacks {}.", place(missing))
+    let what = match second {
+        Some(second) => format!("{} and {}", place(missing), place(second)),
+        None => place(missing),
+    };
+    let headline = match (found(diagnosis).is_some_and(far), second) {
+        (true, Some(_)) => {
+            format!("The model lacks {what}, which together explain part of the error.")
+        }
+        (true, None) => format!("The model lacks {what}, which explains part of the error."),
+        (false, _) => format!("The model lacks {what}."),
     };
     (headline, because)
 }
@@ -220,8 +232,10 @@ fn row(explanation: &Explanation) -> Vec<String> {
         .iter()
         .map(|(name, p)| format!("{name} {} {}", number(p.value), p.unit))
         .collect();
+    let second = explanation.together_with.as_ref();
+    let second = second.map_or_else(String::new, |place| format!(" + {}", place_in_table(place)));
     vec![
-        place_in_table(&explanation.place),
+        place_in_table(&explanation.place) + &second,
         hundredths(explanation.nrmse),
         significance(explanation.significance),
         parameters.join(", "),
