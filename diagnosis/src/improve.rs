@@ -96,8 +96,8 @@ fn improve_with(
         let Some(best) = next else { break verdict };
         match state.add(best, round, measurements, work) {
             Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
-            // It is another name for what the model has. What it would gain is still missing.
-            Ok(false) => break Conclusion::UnknownEffect,
+            // It is another name for what the model has, so nothing more is named.
+            Ok(false) => break Conclusion::NothingMissing,
             done => done?,
         };
     };

@@ -386,7 +386,7 @@ fn on_all_stamps(log: &Log, wanted: &Wanted) -> Table {
         word.is_none_or(|word| NO_TEST.contains(&word.as_str()))
     };
     let mut now = vec![f64::NAN; channels.len()];
-    let mut values = Vec::new();
+    let mut runs = vec![TableRun::default()];
     for group in events.chunk_by(|a, b| a.0 == b.0) {
         let mut news = false;
         for (column, value) in now.iter_mut().enumerate() {
@@ -402,10 +402,20 @@ fn on_all_stamps(log: &Log, wanted: &Wanted) -> Table {
             }
         }
         let known = now.iter().zip(&held).all(|(v, held)| !held || !v.is_nan());
-        if let Some((stamp, _, _)) = group.first().filter(|_| known && news && !idle(&now)) {
-            values.push(*stamp);
-            values.extend(&now);
+        let resting = idle(&now);
+        // A test that is made again is another run, however short the rest between the two was.
+        if resting && runs.last().is_some_and(|run| !run.rows.is_empty()) {
+            runs.push(TableRun::default());
         }
+        let stamp = group.first().map(|(stamp, ..)| *stamp);
+        let stamp = stamp.filter(|_| known && news && !resting);
+        if let (Some(stamp), Some(run)) = (stamp, runs.last_mut()) {
+            run.rows.push(stamp);
+            run.rows.extend(&now);
+        }
+    }
+    if runs.len() > 1 && runs.last().is_some_and(|run| run.rows.is_empty()) {
+        runs.pop();
     }
     let mut columns = vec![ColumnName::new(TIME)];
     columns.extend(channels.iter().map(|c| header(c)));
@@ -413,10 +423,7 @@ fn on_all_stamps(log: &Log, wanted: &Wanted) -> Table {
     Table {
         source: log.source.clone(),
         columns,
-        runs: vec![TableRun {
-            rows: values,
-            ..TableRun::default()
-        }],
+        runs,
         labels: labels.into_iter().map(|(at, w)| (at + 1, w)).collect(),
         own_clocks: true,
         cut: log.cut.as_ref().map_or_else(String::new, cut),

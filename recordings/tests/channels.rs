@@ -14,12 +14,12 @@ use mcap::{WriteOptions, Writer};
 const INPUTS: [Signal; 1] = [Signal::new("voltage", "V", "V", "voltage")];
 const SIGNALS: [Signal; 1] = [Signal::new("speed", "w", "rad/s", "speed")];
 
-/// A command every 100 ms, a sensor every 40 ms from 20 ms on, as MCAP with JSON.
-fn two_clocks() -> Vec<u8> {
+/// Messages in JSON with their topics and times (ms), as MCAP.
+fn mcap(messages: impl IntoIterator<Item = (&'static str, u64, String)>) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let options = WriteOptions::new().compression(None);
     let mut writer = Writer::with_options(&mut bytes, options).unwrap();
-    let send = |writer: &mut Writer<_>, topic: &str, milliseconds: u64, text: String| {
+    for (topic, milliseconds, text) in messages {
         let channel = writer
             .add_channel(0, topic, "json", &BTreeMap::new())
             .unwrap();
@@ -32,21 +32,17 @@ fn two_clocks() -> Vec<u8> {
         writer
             .write_to_known_channel(&header, text.as_bytes())
             .unwrap();
-    };
-    for k in 0..5 {
-        send(&mut writer, "command", 100 * k, format!("{{\"u\":{k}}}"));
-    }
-    for k in 0..10 {
-        send(
-            &mut writer,
-            "sensor",
-            20 + 40 * k,
-            format!("{{\"rpm\":{}}}", 60 * k),
-        );
     }
     writer.finish().unwrap();
     drop(writer);
     bytes.into_inner()
+}
+
+/// A command every 100 ms, a sensor every 40 ms from 20 ms on.
+fn two_clocks() -> Vec<u8> {
+    let commands = (0..5).map(|k| ("command", 100 * k, format!("{{\"u\":{k}}}")));
+    let speeds = (0..10).map(|k| ("sensor", 20 + 40 * k, format!("{{\"rpm\":{}}}", 60 * k)));
+    mcap(commands.chain(speeds))
 }
 
 fn two_topics() -> LogMap {
@@ -91,6 +87,36 @@ fn an_input_holds_and_a_signal_counts_where_it_was_measured() {
     // What was never there is no fault of the log.
     let missing = |f: &&loopsight_recordings::Fault| f.kind == FaultKind::NotANumber;
     assert_eq!(recording.faults.iter().find(missing), None);
+}
+
+/// A driver lets the button go for 0.2 s and pushes it again: that test was made twice, and the robot was somewhere else
+/// in between.
+#[test]
+fn a_test_that_is_made_again_is_another_run() {
+    const STATE: &str = "sysid-test-state-Drive";
+    let state = |ms: u64| match ms {
+        1000..2500 | 2700..5000 => "dynamic-forward",
+        _ => "none",
+    };
+    let each = (0..300).map(|k| 20 * k);
+    let messages = each.flat_map(|ms| {
+        [
+            (STATE, ms, format!("{{\"is\":\"{}\"}}", state(ms))),
+            ("command", ms, format!("{{\"u\":{}}}", ms % 7)),
+            ("sensor", ms, format!("{{\"rpm\":{ms}}}")),
+        ]
+    });
+    let source = read_bytes(&mcap(messages), "tests.mcap").unwrap();
+    let with_state = LogMap {
+        run: Some(format!("{STATE}.is")),
+        ..two_topics()
+    };
+    let recording = map(&source, &INPUTS, &SIGNALS, &with_state).unwrap();
+    let runs: Vec<(&str, f64)> = (recording.runs.iter())
+        .map(|run| (run.name(), (1000.0 * run.duration()).round()))
+        .collect();
+    let expected = [("dynamic-forward", 1480.0), ("dynamic-forward#2", 2280.0)];
+    assert_eq!(runs, expected);
 }
 
 #[test]

@@ -282,3 +282,20 @@ fn a_teaching_board_has_friction_a_driver_that_coasts_and_a_drift() {
     assert!((1.8..2.3).contains(&friction), "{friction} V");
     assert!(found.last() < 0.105, "{:?}", found.unseen);
 }
+
+/// A drive whose step forward was made twice, 0.4 s apart: friction, and a measurement that is late. By hand, with the two
+/// steps as one, friction, delay and sag left 8.5 %.
+#[test]
+#[ignore = "minutes: run in release"]
+fn a_drive_in_a_log_of_a_whole_session_has_friction_and_measures_late() {
+    let log = "formats/frc-drive-2024.wpilog";
+    let Some(found) = improved(Some("frc_drive.toml"), &[log]) else {
+        return;
+    };
+    let friction = found.friction();
+    assert!((0.10..0.14).contains(&friction), "{friction} V");
+    let late = found.late();
+    assert!((0.04..0.06).contains(&late), "{late} s");
+    assert_eq!(found.added.len(), 2, "{:?}", found.added);
+    assert!(found.last() < 0.01, "{:?}", found.unseen);
+}
