@@ -25,6 +25,7 @@ pub(crate) fn choose(
         same: same_advantage,
         close,
         blur,
+        simpler: simpler_effect,
         never_same,
     } = criteria.choice;
     finalists.first()?;
@@ -40,8 +41,15 @@ pub(crate) fn choose(
         let alike = || advantage(rank, other, &criteria.window) < same_advantage;
         error < close * least || error < never_same * least && alike()
     };
+    // What contains another effect hardly ever does worse.
+    let contained = |i: usize| {
+        let [inner, outer] = [i, 0].map(|i| &finalists[i].candidate);
+        outer.meta.simpler.contains(&inner.meta.id) && outer.at == inner.at
+    };
+    let simpler =
+        |i: usize| contained(i) && nrmse(&finalists[i].rank) < simpler_effect * least.sqrt();
     let not_worse: Vec<usize> = (0..finalists.len())
-        .filter(|i| same(*i, 0) || squared(*i) < allowed)
+        .filter(|i| same(*i, 0) || simpler(*i) || squared(*i) < allowed)
         .collect();
     let earned: Vec<bool> = (0..finalists.len())
         .map(|i| earned(i, &explanations[i]))

@@ -163,7 +163,7 @@ fn without(model: &Model, effects: &[usize]) -> Option<Model> {
 /// breakaway friction may have been friction with a delay that was still missing. The step then names the
 /// simpler effect.
 fn simplified(best: &mut Refined<'_>, steps: &mut [ImprovementStep]) -> Result<(), FitError> {
-    let criteria = &best.work.criteria().improve;
+    let criteria = &best.work.criteria().choice;
     for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
         let instances = instances(best.model, place);
         let Some(effect) = instances.first().map(|i| &best.model.effects[*i]) else {

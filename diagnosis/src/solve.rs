@@ -1,12 +1,9 @@
 //! The solution of a least-squares problem: Levenberg–Marquardt within bounds.
 
-use basin::{
-    BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet,
-    ConstraintSolveError, Constraints, Executor, Jacobian, Residual, Termination,
-};
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::FitError;
+use crate::levenberg_marquardt::{LeastSquares, minimise};
 use crate::prediction::Solution;
 use crate::problem::Problem;
 use crate::progress::{Cancelled, Stage};
@@ -65,26 +62,17 @@ impl Problem<'_> {
         start: &DVector<f64>,
         effort: Effort,
     ) -> Result<(DVector<f64>, bool), FitError> {
-        let solver = BoundedLevenbergMarquardt::<DVector<f64>, DMatrix<f64>>::new()
-            .with_absolute_scaled_gradient_tolerance(1e-14)
-            .with_tau(1e-6)
-            .with_relative_cost_change_tolerance(effort.tolerance)
-            .with_relative_step_tolerance(1e-10);
-        let result = Executor::from_start(Borrowed(self, effort), solver, start.clone())
-            .max_iter(effort.iterations)
-            .run();
-        let result = match result {
-            Ok(result) => result,
-            Err(ConstraintSolveError::Evaluation(cancelled)) => return Err(cancelled.into()),
-            Err(error) => return Err(FitError::Solver(error.to_string())),
-        };
-        let solution = result.param().clone();
+        let borrowed = Borrowed(self, effort);
+        let Effort {
+            iterations,
+            tolerance,
+        } = effort;
+        let (solution, settled) = minimise(&borrowed, start, iterations, tolerance)?;
         if solution.iter().any(|v| !v.is_finite()) {
             return Err(FitError::Solver(
                 "the parameters became infinite".to_owned(),
             ));
         }
-        let settled = !matches!(result.report.termination, Termination::Limit(_));
         Ok((solution, settled))
     }
 }
@@ -92,25 +80,15 @@ impl Problem<'_> {
 /// The problem as the solver sees it.
 struct Borrowed<'p, 'a>(&'p Problem<'a>, Effort);
 
-impl Residual for Borrowed<'_, '_> {
-    type Param = DVector<f64>;
-    type Output = DVector<f64>;
+impl LeastSquares for Borrowed<'_, '_> {
     type Error = Cancelled;
+
     fn residual(&self, scaled: &DVector<f64>) -> Result<DVector<f64>, Cancelled> {
         self.0.residual_vector(scaled)
     }
-}
 
-impl Jacobian for Borrowed<'_, '_> {
-    type Jacobian = DMatrix<f64>;
-    fn jacobian(&self, scaled: &DVector<f64>) -> Result<DMatrix<f64>, Cancelled> {
-        Ok(self.residual_and_jacobian(scaled)?.1)
-    }
     /// One simulation gives both the prediction and its derivatives.
-    fn residual_and_jacobian(
-        &self,
-        scaled: &DVector<f64>,
-    ) -> Result<(DVector<f64>, DMatrix<f64>), Cancelled> {
+    fn linearise(&self, scaled: &DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>), Cancelled> {
         let (residual, jacobian) = self.0.linearise(scaled)?;
         let done = self.0.evaluations.get() + 1;
         self.0.evaluations.set(done);
@@ -119,11 +97,8 @@ impl Jacobian for Borrowed<'_, '_> {
         self.0.work.tell_error(Stage::Fitting, done, total, error);
         Ok((residual, jacobian))
     }
-}
 
-impl Constraints for Borrowed<'_, '_> {
-    type Set = ConstraintSet<BoxBounds<DVector<f64>>>;
-    fn constraints(&self) -> <Self::Set as ConstraintDescription>::Borrowed<'_> {
-        ConstraintSet::new().with_bounds(BoxBounds::new(Some(&self.0.lower), Some(&self.0.upper)))
+    fn bounds(&self) -> (&DVector<f64>, &DVector<f64>) {
+        (&self.0.lower, &self.0.upper)
     }
 }

@@ -16,7 +16,7 @@ use crate::solve::Effort;
 
 /// Effort of the short fit of a candidate.
 const LOOK: Effort = Effort {
-    iterations: 7,
+    iterations: 9,
     tolerance: 1e-3,
 };
 /// Effort of a finalist.

@@ -5,8 +5,9 @@ use loopsight_model::model::Model;
 use loopsight_model::registry;
 use serde::Serialize;
 
-use crate::candidates::{Seen, channel_sets, has_another_name, unshown_part};
+use crate::candidates::Seen;
 use crate::criteria::SearchCriteria;
+use crate::places::{channel_sets, has_another_name, unshown_part};
 use crate::shows::{can_show, what_is_absent};
 
 /// An effect of the library that fits the plant and was not tried, because the recording cannot show it.

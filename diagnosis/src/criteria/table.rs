@@ -157,6 +157,8 @@ criteria! {
         close: f64 = 1.01 "1", Judgement: "one per cent of an error does not matter in use";
         /// A simpler explanation may be worse by this share of what the best one leaves above the floor.
         blur: f64 = 0.3 "1", Judgement: "while much is missing, small differences may come from what else is missing";
+        /// Ratio of errors up to which a simpler effect takes the place of one that contains it.
+        simpler: f64 = 1.02 "1", Judgement: "one parameter less is worth two per cent";
         /// Ratio of errors beyond which two explanations are never the same, whatever their significance.
         never_same: f64 = 1.5 "1", Judgement: "one transient has too few samples for a test of significance";
     }
@@ -203,8 +205,6 @@ criteria! {
         worth: f64 = 0.04 "1", Judgement: "below it some effect of the library fits every detail of the residuals";
         /// Most effects that are added.
         most: usize = 6 "1", Judgement: "more would fit the log without explaining it";
-        /// Ratio of errors up to which a simpler effect takes the place of one that contains it.
-        simpler: f64 = 1.02 "1", Judgement: "one parameter less is worth two per cent";
         /// Ratio of errors below which another effect takes the place of one that it could not be told from.
         better: f64 = 0.9 "1", Judgement: "a smaller gain may come from what else is missing";
         /// While more is missing, an added effect goes if a parameter of an earlier one has this multiple of its standard error with it.

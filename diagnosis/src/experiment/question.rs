@@ -6,9 +6,10 @@ use loopsight_model::model::{Model, misfit};
 use loopsight_model::registry::{self, BuildError};
 
 use crate::EffectAt;
-use crate::candidates::{channel_sets, suit};
+use crate::candidates::suit;
 use crate::criteria::Criteria;
 use crate::experiment::ExperimentLimits;
+use crate::places::channel_sets;
 use crate::progress::Cancelled;
 
 /// Why a question cannot be answered.
