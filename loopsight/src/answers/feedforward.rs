@@ -25,7 +25,7 @@ const ARRIVED: f64 = 1e-12;
 pub struct Feedforward {
     /// The log's unit of length or angle: `Meters`, `Rotations`.
     pub units: String,
-    /// Voltage that friction takes; absent where none was found.
+    /// Voltage that friction takes, the mean of both directions; absent where none was found.
     #[serde(rename = "kS", skip_serializing_if = "Option::is_none")]
     pub k_s: Option<ParameterEstimate>,
     /// Voltage that gravity takes; absent where none was found.
@@ -68,7 +68,9 @@ impl Feedforward {
         let volts = |effects: &[&str]| {
             let named = |name: &str| {
                 let effect = name.split(['.', '@']).next();
-                effect.is_some_and(|e| effects.contains(&e)) && name.ends_with(".level")
+                let levels = [".level", ".level_forward", ".level_backward"];
+                effect.is_some_and(|e| effects.contains(&e))
+                    && levels.iter().any(|l| name.ends_with(l))
             };
             let found = fit.parameters.iter();
             let found = found.filter(|(name, p)| named(name) && p.unit == "V");
@@ -77,7 +79,11 @@ impl Feedforward {
         let feedback = Feedback::of(k_v.value, k_a.value)?;
         Some(Self {
             units: units.to_owned(),
-            k_s: volts(&["coulomb_friction", "stribeck_friction"]),
+            k_s: volts(&[
+                "coulomb_friction",
+                "stribeck_friction",
+                "directional_friction",
+            ]),
             k_g: volts(&["constant_force", "gravity_pendulum"]),
             k_v,
             k_a,
