@@ -1,5 +1,7 @@
 //! Parameters, declared once.
 
+use crate::Role;
+
 /// A number a component depends on: name, symbol, unit, range, default and one sentence.
 ///
 /// Help, TOML templates, validation, fits, documentation and reports come from this declaration.
@@ -48,6 +50,9 @@ pub struct Parameter {
     /// Sides on which it acts, see [`crate::Channel::side`]; empty: everywhere. Where an effect is attached to none of
     /// them, it is frozen in a fit.
     pub sides: &'static [i8],
+    /// A quantity that its influence is in proportion to, or nearly so: it has none while that stays at zero. Where the
+    /// recording does not show that quantity (see [`crate::Unshown::still`]), it is frozen in a fit.
+    pub shown_by: Option<Role>,
 }
 
 impl Parameter {
@@ -75,6 +80,7 @@ impl Parameter {
             starts_in_durations: false,
             starts_at_ends: false,
             sides: &[],
+            shown_by: None,
         }
     }
 
@@ -153,6 +159,17 @@ impl Parameter {
     pub const fn on_sides(mut self, sides: &'static [i8]) -> Self {
         self.sides = sides;
         self
+    }
+
+    /// Has no influence while this quantity is zero.
+    pub const fn shown_by(mut self, role: Role) -> Self {
+        self.shown_by = Some(role);
+        self
+    }
+
+    /// Whether it is a speed over which the sign of a force is smoothed.
+    pub fn is_width(&self) -> bool {
+        self.unit == "flow" && !self.estimated
     }
 
     /// Whether `value` lies in the declared range; never true for NaN or infinity.

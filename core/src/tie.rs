@@ -1,6 +1,6 @@
 //! Ties: what a plant declares of parameters that a recording may not show.
 
-use crate::Real;
+use crate::{Real, Role};
 
 /// A part of a plant that shows only when its inputs are combined in one way, and what its parameters are
 /// likely to be where they never are.
@@ -19,6 +19,9 @@ pub struct Unshown {
     /// Efforts, by the ids of their channels, that act on this part alone. What the ties assume cannot be told from
     /// an effect there.
     pub channels: &'static [&'static str],
+    /// Quantities that stay near zero where it does not show. What they would tell of an effect is not known then:
+    /// [`Parameter::shown_by`](crate::Parameter::shown_by).
+    pub still: &'static [Role],
     /// Why they are likely to be so, in one sentence.
     pub because: &'static str,
 }

@@ -429,3 +429,37 @@ fn a_pushed_rate_is_a_slope() {
     simulator.advance(2.0, &[0.0]);
     assert!((simulator.state()[0] - 3.0).abs() < 1e-12);
 }
+
+/// A shaft that sticks is the fastest that a model knows. A step that is too long for it would make the derivatives grow
+/// without end.
+#[test]
+fn derivatives_are_exact_where_friction_is_sharp() {
+    let text = format!(
+        "{AXIS}[[effect]]\n[effect.coulomb_friction]\nat = [\"shaft\"]\nlevel = 2.0\nwidth = 0.003\n"
+    );
+    let axis = model(&text);
+    let values = axis.values();
+    let level = axis
+        .parameters
+        .iter()
+        .position(|p| p.name == "coulomb_friction.level");
+    let level = level.unwrap();
+    let found = derivatives(&axis, &values, level);
+    let moved = |change: f64| {
+        let mut values = values.clone();
+        values[level] += change;
+        simulate(&axis, &values)
+    };
+    let change = 1e-5;
+    let (more, less) = (moved(change), moved(-change));
+    let by_difference: Vec<Vec<f64>> = (more.iter().zip(&less))
+        .map(|(a, b)| {
+            a.iter()
+                .zip(b)
+                .map(|(a, b)| (a - b) / (2.0 * change))
+                .collect()
+        })
+        .collect();
+    let off = difference(&found, &by_difference);
+    assert!(off < 1e-3, "{off}");
+}

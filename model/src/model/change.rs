@@ -39,6 +39,7 @@ impl Model {
         let attached = bind(self.plant, ready, channels, &base, &mut model.parameters);
         model.effects.push(attached);
         make_names_unique(&mut model.parameters, &model.effects);
+        model.hold_unshown();
         Some(model)
     }
 

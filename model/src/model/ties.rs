@@ -1,6 +1,6 @@
 //! Parameters that follow from others.
 
-use loopsight_core::{Real, Tie, Unshown};
+use loopsight_core::{Real, Role, Tie, Unshown};
 
 use super::Model;
 use crate::config::{ConfigError, TomlSource, nearest};
@@ -88,7 +88,22 @@ impl Model {
             }
         }
         model.follow_ties();
+        model.hold_unshown();
         model
+    }
+
+    /// Freezes the parameters of effects that have no influence while what the tied parts do not show stays at zero: how
+    /// gravity acts across the way of a vehicle that never turns.
+    pub(super) fn hold_unshown(&mut self) {
+        let still: Vec<Role> = self
+            .tied_parts()
+            .flat_map(|part| part.still)
+            .copied()
+            .collect();
+        for parameter in &mut self.parameters {
+            let role = parameter.declaration.shown_by;
+            parameter.free &= role.is_none_or(|role| !still.contains(&role));
+        }
     }
 
     /// Ties the parameters of these names, as the plant says.
@@ -115,6 +130,7 @@ impl Model {
             self.bind(tied);
         }
         self.follow_ties();
+        self.hold_unshown();
         Ok(())
     }
 

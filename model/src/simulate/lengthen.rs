@@ -180,7 +180,7 @@ impl<S: HostReal> Simulator<'_, S> {
 
     /// The fastest rate of the model where it is now, `elapsed` seconds after the start of the interval: 1/s. The
     /// Jacobian is the one there afterwards.
-    fn fastest(&mut self, input: &[f64], elapsed: f64) -> f64 {
+    pub(super) fn fastest(&mut self, input: &[f64], elapsed: f64) -> f64 {
         self.apply(input, elapsed);
         self.way = Way::Linearise;
         // What an input does later is no part of it, and nothing is to be remembered.

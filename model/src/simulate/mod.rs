@@ -9,6 +9,7 @@ mod observer;
 mod push;
 mod ramp;
 mod sensing;
+mod shorten;
 mod start;
 mod state_observer;
 mod step;
@@ -202,6 +203,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             model,
         };
         simulator.reset(&vec![S::zero(); nx], &vec![0.0; nu]);
+        simulator.shorten();
         simulator
     }
 

@@ -11,7 +11,7 @@ const DIFFERENCE: f64 = 1e-8;
 /// Squarings for the spectral radius: what the units of the states distort, shows in it by its 32nd root.
 const SQUARINGS: usize = 5;
 /// Radius of the half disc in which the classical method of Runge and Kutta is stable.
-const STABLE: f64 = 2.5;
+pub(super) const STABLE: f64 = 2.5;
 
 /// What a step does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

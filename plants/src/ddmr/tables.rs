@@ -443,9 +443,8 @@ pub(super) const CHANNELS: [Channel; 14] = [
     },
 ];
 
-/// A vehicle whose sides are alike and do not feel each other obeys `v_i' = K_A v_i + 2 K_C V_i` on each
-/// of them: then `K_D = K_A` and `K_F = K_C/b`. That is the case where the inertia about the axle is that
-/// of the mass at the wheels, `I + m d² = m b²`, and it is what WPILib's SysId assumes of a drivetrain.
+/// A vehicle whose sides are alike and do not feel each other obeys `v_i' = K_A v_i + 2 K_C V_i` on each of them: then
+/// `K_D = K_A` and `K_F = K_C/b`. So it is where `I + m d² = m b²`, and WPILib's SysId assumes it.
 pub(super) const UNSHOWN: [Unshown; 2] = [
     Unshown {
         what: "turning",
@@ -461,6 +460,7 @@ pub(super) const UNSHOWN: [Unshown; 2] = [
             },
         ],
         channels: &["body.yaw"],
+        still: &[Role::Heading, Role::Yaw],
         because: "each side moved alone",
     },
     Unshown {
@@ -477,6 +477,7 @@ pub(super) const UNSHOWN: [Unshown; 2] = [
             },
         ],
         channels: &["body.forward"],
+        still: &[Role::Forward],
         because: "each side moved alone",
     },
 ];

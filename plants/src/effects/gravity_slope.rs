@@ -44,7 +44,8 @@ impl Effect for GravitySlope {
                 .scaled(0.3),
             Parameter::new("sine", "b", "channel", "acceleration at heading π/2")
                 .or(0.0)
-                .scaled(0.3),
+                .scaled(0.3)
+                .shown_by(Role::Heading),
         ],
         rarity: 2,
         ..EffectMeta::PLAIN
