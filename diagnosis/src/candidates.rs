@@ -51,6 +51,11 @@ impl Candidate {
         if self.separate { self.at.len() } else { 1 }
     }
 
+    /// Whether it is contained in another candidate at its place.
+    pub(crate) fn is_special(&self, of: &Self) -> bool {
+        of.meta.simpler.contains(&self.meta.id) && of.at == self.at
+    }
+
     /// The name of one of its own parameters, by index in the model, as it is reported.
     pub(crate) fn name(&self, index: usize) -> String {
         let id = self.model.parameters[index].declaration.id;
@@ -89,7 +94,7 @@ impl Candidate {
 
     /// Its own widths over which signs are smoothed.
     pub(crate) fn own_widths(&self) -> Vec<usize> {
-        let is_width = |i: &usize| is_width(self.model.parameters[*i].declaration);
+        let is_width = |i: &usize| self.model.parameters[*i].declaration.is_width();
         self.own().filter(is_width).collect()
     }
 
@@ -108,7 +113,7 @@ impl Candidate {
         let speeds = |width: bool| {
             self.own().filter_map(move |i| {
                 let declaration = &self.model.parameters[i].declaration;
-                (declaration.unit == "flow" && is_width(declaration) == width)
+                (declaration.unit == "flow" && declaration.is_width() == width)
                     .then(|| values.get(i).copied())
                     .flatten()
             })
@@ -323,16 +328,11 @@ fn widths(model: &Model, rms: &[f64], sign_width: f64) -> Vec<(usize, f64)> {
         let declarations = effect.meta.parameters.iter().enumerate();
         let first = effect.first_parameter;
         declarations
-            .filter(|(_, declaration)| is_width(declaration))
+            .filter(|(_, declaration)| declaration.is_width())
             .map(|(i, _)| (first + i, width))
             .collect::<Vec<_>>()
     };
     model.effects.iter().flat_map(of_effect).collect()
-}
-
-/// Whether a parameter is a speed over which a sign is smoothed.
-pub(crate) fn is_width(declaration: &Parameter) -> bool {
-    declaration.unit == "flow" && !declaration.estimated
 }
 
 /// Whether a parameter is counted per way that the machine goes.
@@ -345,7 +345,7 @@ pub(crate) fn smooth(model: &mut Model, count: usize, width: f64) -> bool {
     let mut has = false;
     for effect in model.effects.iter().rev().take(count) {
         for (i, declaration) in effect.meta.parameters.iter().enumerate() {
-            if is_width(declaration) && width > 0.0 {
+            if declaration.is_width() && width > 0.0 {
                 model.parameters[effect.first_parameter + i].value = Some(width);
                 has = true;
             }
@@ -364,8 +364,8 @@ mod tests {
                          [log.measured]\ntrack_speed_right = { sensor = \"instantaneous\" }\n\
                          track_speed_left = { sensor = \"instantaneous\" }\n";
 
-    /// Channels of the candidates, where this part of the robot does not show; all where none is named.
-    fn tried(unshown: Option<&str>) -> Vec<&'static str> {
+    /// The candidates, where this part of the robot does not show; all where none is named.
+    fn tried(unshown: Option<&str>) -> Vec<Candidate> {
         let (robot, _) = Model::from_toml("robot.toml", ROBOT).unwrap();
         let mut parts = robot.unshown().iter();
         let part = unshown.map(|what| parts.find(|part| part.what == what).unwrap());
@@ -382,13 +382,36 @@ mod tests {
             ends: &[],
             observed: false,
         };
-        let all = candidates(&robot, &seen, &SearchCriteria::DEFAULT);
-        all.into_iter().flat_map(|c| c.at).collect()
+        candidates(&robot, &seen, &SearchCriteria::DEFAULT)
+    }
+
+    fn channels(unshown: Option<&str>) -> Vec<&'static str> {
+        let tried = tried(unshown);
+        tried.into_iter().flat_map(|c| c.at).collect()
+    }
+
+    /// What a fit finds of gravity on a slope.
+    fn of_slope(unshown: Option<&str>) -> Vec<String> {
+        let tried = tried(unshown).into_iter();
+        let slope = tried.filter(|c| c.meta.id == "gravity_slope");
+        let own = |c: Candidate| {
+            let parameters = c.model.parameters[c.own()].to_vec();
+            parameters.into_iter().filter(|p| p.free).map(|p| p.name)
+        };
+        slope.flat_map(own).collect()
+    }
+
+    /// A vehicle that never turns says nothing of the force across its way.
+    #[test]
+    fn what_the_heading_would_show_is_held_where_it_stays() {
+        let [along, across] = ["gravity_slope.cosine", "gravity_slope.sine"];
+        assert_eq!(of_slope(None), [along, across]);
+        assert_eq!(of_slope(Some("turning")), [along]);
     }
 
     #[test]
     fn nothing_is_tried_where_the_log_shows_nothing() {
-        let all = tried(None);
+        let all = channels(None);
         for channel in ["wheel.right", "body.forward", "body.yaw"] {
             assert!(all.contains(&channel), "{channel}");
         }
@@ -396,7 +419,7 @@ mod tests {
             ("turning", "body.yaw"),
             ("driving straight", "body.forward"),
         ] {
-            let some = tried(Some(part));
+            let some = channels(Some(part));
             assert!(some.contains(&"wheel.right"), "{part}: {some:?}");
             // A change of the payload is one of the whole.
             assert!(some.contains(&"inertia.forward"), "{part}: {some:?}");

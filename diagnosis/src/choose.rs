@@ -25,29 +25,28 @@ pub(crate) fn choose(
         same: same_advantage,
         close,
         blur,
-        simpler: simpler_effect,
         never_same,
+        ..
     } = criteria.choice;
     finalists.first()?;
-    let squared = |i: usize| nrmse(&finalists[i].rank).powi(2);
+    let error = |i: usize| finalists[i].error();
+    let complexity = |i: usize| finalists[i].candidate.complexity();
+    let squared = |i: usize| error(i).powi(2);
     let least = squared(0);
     // While the best explanation leaves much unexplained, something else is missing too. It may cause small
     // differences between explanations.
     let allowed = least + blur * (least - floor * floor).max(0.0);
     // No worse than another one: not significantly, or by too little to matter in use.
     let same = |i: usize, other: usize| {
-        let (rank, other) = (&finalists[i].rank, &finalists[other].rank);
-        let (error, least) = (nrmse(rank), nrmse(other));
-        let alike = || advantage(rank, other, &criteria.window) < same_advantage;
-        error < close * least || error < never_same * least && alike()
+        let ranks = [i, other].map(|i| &finalists[i].rank);
+        let alike = || advantage(ranks[0], ranks[1], &criteria.window) < same_advantage;
+        error(i) < close * error(other) || error(i) < never_same * error(other) && alike()
     };
     // What contains another effect hardly ever does worse.
-    let contained = |i: usize| {
-        let [inner, outer] = [i, 0].map(|i| &finalists[i].candidate);
-        outer.meta.simpler.contains(&inner.meta.id) && outer.at == inner.at
+    let simpler = |i: usize| {
+        let contained = finalists[i].candidate.is_special(&finalists[0].candidate);
+        contained && error(i) < criteria.choice.allowance(complexity(0), complexity(i)) * error(0)
     };
-    let simpler =
-        |i: usize| contained(i) && nrmse(&finalists[i].rank) < simpler_effect * least.sqrt();
     let not_worse: Vec<usize> = (0..finalists.len())
         .filter(|i| same(*i, 0) || simpler(*i) || squared(*i) < allowed)
         .collect();
@@ -56,8 +55,6 @@ pub(crate) fn choose(
         .collect();
     let none_earned = !not_worse.iter().any(|i| earned[*i]);
     let may = |i: &usize| earned[*i] || none_earned;
-    let complexity = |i: usize| finalists[i].candidate.complexity();
-    let error = |i: usize| nrmse(&finalists[i].rank);
     let firsts = || not_worse.iter().copied().filter(may);
     let simplest = firsts().map(complexity).min()?;
     let leader = firsts()

@@ -57,6 +57,13 @@ impl Criteria {
     }
 }
 
+impl ChoiceCriteria {
+    /// Ratio of errors up to which an effect with `few` parameters takes the place of one with `many` that contains it.
+    pub(crate) fn allowance(&self, many: usize, few: usize) -> f64 {
+        self.simpler.powi(many.saturating_sub(few) as i32)
+    }
+}
+
 /// What a criterion may be: a number, or a count.
 trait Number: Copy {
     fn number(self) -> f64;

@@ -19,7 +19,7 @@ use crate::measurements::Measurements;
 use crate::observer::{Correction, attach_same_observer};
 use crate::output_error::prepare;
 use crate::pairs::pair;
-use crate::prediction::{Solution, signal_rms};
+use crate::prediction::{Solution, moves_starts, signal_rms};
 use crate::problem::Problem;
 use crate::progress::{Cancelled, Stage, Work};
 use crate::residual_force;
@@ -159,12 +159,14 @@ fn steps(
     diagnosis.floor.nrmse = floor(model, test.as_deref().unwrap_or(runs), &criteria.log);
 
     let plain = fit_plain(diagnosis, model, &holdout, work)?;
+    let moves = moves_starts(&plain.model, &plain.solution, runs, work)?;
     let nominal = Nominal {
         given: model,
         model: &plain.model,
         solution: &plain.solution,
         cost: plain.cost,
         rank: &plain.judgement.rank,
+        held: (!moves).then_some(&plain.solution.states),
         holdout: &holdout,
         work: &silent,
     };

@@ -74,6 +74,15 @@ impl Estimate {
     }
 }
 
+/// Whether a fit would take one of an effect's parameters beyond where it is searched: the effect stands in for another
+/// one. An end at zero or one is that of a law, as that of a share, and no such end.
+pub(crate) fn stands_in<'a>(mut estimates: impl Iterator<Item = &'a Estimate>) -> bool {
+    estimates.any(|estimate| {
+        let of_law = estimate.value == 0.0 || estimate.value.abs() == 1.0;
+        estimate.verdict == ParameterVerdict::AtBound && !of_law
+    })
+}
+
 /// Whether the data say how strong an effect is: its `parameters`, with their estimates. One that is zero without
 /// the effect must be determined, or any at all where there is none of that kind. When a payload changes is no
 /// evidence while nobody can tell by how much.

@@ -4,6 +4,7 @@ use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::Criteria;
 use crate::diagnose::{Aim, Discover, diagnose_for};
 use crate::error::{CompareError, FitError};
+use crate::estimate::stands_in;
 use crate::fit::fit;
 use crate::fitted::Fit;
 use crate::improvement::{Improvement, ImprovementStep};
@@ -11,7 +12,7 @@ use crate::measurements::Measurements;
 use crate::pairs::pair;
 use crate::progress::{Cancelled, Work};
 use crate::refine::{
-    blurs, is_undetermined, refine, renames, still_open, take_values, without_step,
+    blurs, estimated, is_undetermined, refine, renames, still_open, take_values, without_step,
 };
 use crate::settings::{FitSettings, ImproveSettings, Method};
 use loopsight_model::model::Model;
@@ -92,8 +93,14 @@ fn improve_with(
             (Some(_), Some(best)) if round < work.criteria().improve.most => Some(best.clone()),
             _ => None,
         };
+        let before = diagnosis.nominal.nrmse;
         state.diagnoses.push(diagnosis);
         let Some(best) = next else { break verdict };
+        // Something is missing, but hardly this.
+        let tradeable = best.nrmse >= work.criteria().improve.worth_blurring * before;
+        if tradeable && stands_in(best.parameters.values()) {
+            break Conclusion::UnknownEffect;
+        }
         match state.add(best, round, measurements, work) {
             Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
             // It is another name for what the model has, so nothing more is named.
@@ -222,6 +229,8 @@ impl State {
     ///
     /// * while the log does not say how strong its effect is and the unseen error hardly fell with it: there is some
     ///   effect for every imperfection, and it would take their values from the parameters that the log does determine;
+    /// * while a parameter of it is at an end of where it is searched, and it explains no large part: it stands in for
+    ///   another effect;
     /// * while something is missing with it, too, and it blurs what the log said of an earlier effect.
     fn settled(
         &mut self,
@@ -246,16 +255,18 @@ impl State {
             let fell_to = last.nrmse_test / before.nrmse_test;
             let hardly = fell_to >= improve.better;
             let incomplete = last.nrmse_test > missing.above_floor * floor;
-            let undetermined = hardly && is_undetermined(&present, last, missing.undetermined);
-            let may_blur = incomplete && (hardly || fell_to >= improve.worth_blurring);
-            if present.cancelled || !undetermined && !may_blur {
+            let tradeable = fell_to >= improve.worth_blurring;
+            let idle = hardly && is_undetermined(&present, last, missing.undetermined)
+                || tradeable && stands_in(estimated(&present, last).into_iter().map(|(_, e)| e));
+            let may_blur = incomplete && tradeable;
+            if present.cancelled || !idle && !may_blur {
                 return Ok(present);
             }
             let Some(without) = self.without_last(&present.model) else {
                 return Ok(present);
             };
             let alone = fit(&without, measurements, settings, work)?;
-            if !undetermined && !blurs(&alone, &present, missing.undetermined, improve.blurs) {
+            if !idle && !blurs(&alone, &present, missing.undetermined, improve.blurs) {
                 return Ok(present);
             }
             self.present = without;

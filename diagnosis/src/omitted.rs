@@ -1,32 +1,38 @@
-//! What a log's clock leaves open in the parameters.
+//! What a model leaves out, and what that leaves open in the parameters.
 //!
-//! No model of a machine is exact, and what every model leaves out is what is faster than the log: windings, filters,
-//! the instant within a period at which an input acted. Such a thing moves the whole response by a little time `δ`.
-//! It is too little to be found as an effect, but a long log determines parameters so sharply that it is many of
-//! their standard errors.
+//! No model of a machine is exact. It leaves out what is faster than the log: windings, filters, the instant within a
+//! period at which an input acted. Such a thing moves the whole response by a little time `δ`. And it smooths the sign
+//! of dry friction over a small speed, for the sake of the integrator. Both are too little to be found as an effect,
+//! but a long log determines parameters so sharply that they are many of their standard errors.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::criteria::ParameterCriteria;
 use crate::noise;
 use crate::prediction::predict_with;
 use crate::problem::Problem;
 use crate::progress::Cancelled;
 
-/// Standard errors beyond which a shift counts: `√2`, from where a model with it predicts better (H. Akaike, 1974, "A new
-/// look at the statistical model identification").
+/// Standard errors beyond which an omission counts: `√2`, from where a model with it predicts better (H. Akaike, 1974,
+/// "A new look at the statistical model identification").
 const EARNED: f64 = std::f64::consts::SQRT_2;
 
-/// A shift of the response in time, in periods of the log, as it stands in a linearised fit.
-pub(crate) struct Shift {
+/// Something that the model leaves out, as it stands in a linearised fit.
+pub(crate) struct Omitted {
     /// Change of the unknowns with it.
     along: DVector<f64>,
-    /// Its size, periods.
+    /// Its size.
     size: f64,
 }
 
-/// The size of a shift that was found with a standard error, where a clock is `known` to so much. None where it is
-/// chance.
+/// Something that a model leaves out.
+pub(crate) struct Omission {
+    /// The change of the residuals with it.
+    pub(crate) direction: DVector<f64>,
+    /// The size that it may have where the log cannot tell it better.
+    pub(crate) known: f64,
+}
+
+/// The size of what was found with a standard error, where it is `known` to so much. None where it is chance.
 fn allowed(found: f64, error: f64, known: f64) -> Option<f64> {
     let tells = error < known;
     if tells && found.abs() <= EARNED * error {
@@ -35,29 +41,31 @@ fn allowed(found: f64, error: f64, known: f64) -> Option<f64> {
     Some(if tells { found.abs() } else { known })
 }
 
-impl Shift {
-    /// That of a fit by its sums alone: those of the unknowns, and as the last row and column those of `d`.
+impl Omitted {
+    /// That of a fit by its sums alone: those of the unknowns, and as the row and column `extra` those of `d`.
     ///
-    /// `meat` is the covariance of `(J, d)ᵀ r`. For the rest see [`Problem::shift`].
+    /// `meat` is the covariance of the products of all rows with `r`. A direction of which less than `flat` is left
+    /// beside the parameters is none. For the rest see [`Problem::omitted`].
     pub(crate) fn of_sums(
-        gram: &DMatrix<f64>,
-        right: &DVector<f64>,
-        meat: &DMatrix<f64>,
+        (gram, right, meat): (&DMatrix<f64>, &DVector<f64>, &DMatrix<f64>),
         inverse: &DMatrix<f64>,
-        criteria: &ParameterCriteria,
+        extra: usize,
+        known: f64,
+        flat: f64,
     ) -> Option<Self> {
         let n = inverse.ncols();
-        let along = -(inverse * gram.view((0, n), (n, 1)).column(0));
-        let beside = along.clone().push(1.0);
-        let (whole, left) = (gram[(n, n)], (gram * &beside).dot(&beside));
+        let along = -(inverse * gram.view((0, extra), (n, 1)).column(0));
+        let mut beside = along.clone().resize_vertically(gram.nrows(), 0.0);
+        beside[extra] = 1.0;
+        let (whole, left) = (gram[(extra, extra)], (gram * &beside).dot(&beside));
         if !(whole > 0.0 && whole.is_finite() && along.iter().all(|v| v.is_finite())) {
             return None;
         }
-        let size = if left > criteria.flat * whole {
+        let size = if left > flat * whole {
             let error = (meat * &beside).dot(&beside).max(0.0).sqrt() / left;
-            allowed(right.dot(&beside) / left, error, criteria.clock)?
+            allowed(right.dot(&beside) / left, error, known)?
         } else {
-            criteria.clock
+            known
         };
         Some(Self { along, size })
     }
@@ -69,80 +77,123 @@ impl Shift {
 }
 
 impl Problem<'_> {
-    /// How the unknowns would change with a shift of the response in time, and how large a shift the log allows.
+    /// How the unknowns would change with what the model leaves out, and how much of it the log allows.
     ///
-    /// With the residual `r` and its Jacobian `J` at the solution, and `d = ∂r/∂δ = ŷ'·T` for a shift in periods `T`
-    /// of the log, a small shift changes the unknowns by
+    /// With the residual `r` and its Jacobian `J` at the solution, and the change `d = ∂r/∂δ` of the residuals with what
+    /// is left out, a small `δ` changes the unknowns by
     ///
     /// ```text
     /// ∂θ/∂δ = -(JᵀJ)⁻¹ Jᵀ d
     /// ```
     ///
-    /// What is left of `d` beside the parameters, `e = d - J (JᵀJ)⁻¹ Jᵀ d`, tells the shift itself: `δ = -eᵀr/eᵀe`, with
-    /// the standard error `s` of coloured noise. A `δ` beyond `√2` of these is an error of the model, and moves the
-    /// parameters by that much; a smaller one is chance. Where a log cannot tell it better than its clock is
-    /// known, that is what it may be: a delay among the parameters leaves nothing of `d`. (The bias of an omitted
-    /// regressor: H. Theil, 1957, "Specification errors and the estimation of economic relationships".)
-    pub(crate) fn shift(
+    /// What is left of `d` beside the parameters, `e = d - J (JᵀJ)⁻¹ Jᵀ d`, tells `δ` itself: `δ = -eᵀr/eᵀe`, with the
+    /// standard error `s` of coloured noise. A `δ` beyond `√2` of these is an error of the model, and moves the parameters
+    /// by that much; a smaller one is chance. Where a log cannot tell it better than it is known beforehand, that is what
+    /// it may be: a delay among the parameters leaves nothing of a shift in time. (The bias of an omitted regressor: H.
+    /// Theil, 1957, "Specification errors and the estimation of economic relationships".)
+    pub(crate) fn omitted(
         &self,
-        at: &DVector<f64>,
+        omission: &Omission,
         residual: &DVector<f64>,
         jacobian: &DMatrix<f64>,
         inverse: &DMatrix<f64>,
-    ) -> Result<Option<Shift>, Cancelled> {
-        let criteria = &self.work.criteria().parameters;
-        let direction = self.shifted(at)?;
-        let along = -(inverse * jacobian.tr_mul(&direction));
-        let beside = &direction + jacobian * &along;
+    ) -> Result<Option<Omitted>, Cancelled> {
+        let Omission { direction, known } = omission;
+        let along = -(inverse * jacobian.tr_mul(direction));
+        let beside = direction + jacobian * &along;
         let (whole, left) = (direction.norm_squared(), beside.norm_squared());
         if !(whole > 0.0 && whole.is_finite() && along.iter().all(|v| v.is_finite())) {
             return Ok(None);
         }
         // Rounding errors are all that is left of a direction within those of the parameters.
-        let size = if left > criteria.flat * whole {
+        let size = if left > self.work.criteria().parameters.flat * whole {
             let found = beside.dot(residual) / left;
             let column = DMatrix::from_column_slice(beside.len(), 1, beside.as_slice());
             let inverse = DMatrix::from_element(1, 1, 1.0 / left);
             let blocks = self.blocks(residual, &column);
             let n_signals = self.model.measured.len();
             let variance = noise::covariance(&blocks, n_signals, &inverse, 1, &self.work)?[(0, 0)];
-            allowed(found, variance.max(0.0).sqrt(), criteria.clock)
+            allowed(found, variance.max(0.0).sqrt(), *known)
         } else {
-            Some(criteria.clock)
+            Some(*known)
         };
-        Ok(size.map(|size| Shift { along, size }))
+        Ok(size.map(|size| Omitted { along, size }))
     }
 
-    /// The change of the residuals with a shift of one period.
-    fn shifted(&self, at: &DVector<f64>) -> Result<DVector<f64>, Cancelled> {
+    /// What the model leaves out at a solution: `δ` is a shift of the response in periods of the log, and the share of
+    /// its way that the smoothing of signs goes to none.
+    pub(crate) fn omissions(&self, at: &DVector<f64>) -> Result<Vec<Omission>, Cancelled> {
         let (values, states) = self.unpack(at);
+        let sharper = self.sharper(&values);
         let n = self.model.measured.len();
         let rows: usize = self.runs.iter().map(|run| run.len() * n).sum();
-        let mut direction = DMatrix::zeros(rows, 1);
+        // The columns are that of the shift and that of the sharp signs.
+        let columns = 1 + usize::from(sharper.is_some());
+        let mut directions = DMatrix::zeros(rows, columns);
         let mut first_row = 0;
         for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
-            let positions = self.positions.as_ref();
             let x0 = x0.as_slice();
-            let predicted = predict_with(positions, self.model, &values, x0, run, &self.work)?;
+            let predict = |values: &[f64]| {
+                predict_with(
+                    self.positions.as_ref(),
+                    self.model,
+                    values,
+                    x0,
+                    run,
+                    &self.work,
+                )
+            };
+            let predicted = predict(&values)?;
+            let sharp = sharper.as_deref().map(predict).transpose()?;
             let time = run.time();
             let period = run.median_period();
-            // The response before the run is not known: its first sample does not move.
-            for k in 1..run.len() {
-                let (before, after) = (k - 1, (k + 1).min(run.len() - 1));
+            for k in 0..run.len() {
+                // The response before the run is not known: its first sample does not move.
+                let (before, after) = (k.saturating_sub(1), (k + 1).min(run.len() - 1));
                 let span = time[after] - time[before];
                 for signal in 0..n {
                     let row = k * n + signal;
-                    if !run.measured()[row].is_finite() || span <= 0.0 {
+                    if !run.measured()[row].is_finite() {
                         continue;
                     }
-                    let change = predicted[after * n + signal] - predicted[before * n + signal];
-                    direction[(first_row + row, 0)] =
-                        change / span * period * self.weight(index, row);
+                    let weight = self.weight(index, row);
+                    let to = first_row + row;
+                    if k > 0 && span > 0.0 {
+                        let change = predicted[after * n + signal] - predicted[before * n + signal];
+                        directions[(to, 0)] = change / span * period * weight;
+                    }
+                    if let Some(sharp) = &sharp {
+                        directions[(to, 1)] = SHARPER * (predicted[row] - sharp[row]) * weight;
+                    }
                 }
             }
-            self.filter_jacobian(index, first_row, run.len() * n, &mut direction);
+            self.filter_jacobian(index, first_row, run.len() * n, &mut directions);
             first_row += run.len() * n;
         }
-        Ok(direction.column(0).into_owned())
+        let known = [self.work.criteria().parameters.clock, 1.0];
+        let columns = directions.column_iter().zip(known);
+        let omissions = columns.map(|(direction, known)| Omission {
+            direction: direction.into_owned(),
+            known,
+        });
+        Ok(omissions.collect())
+    }
+
+    /// The parameter `values` with all signs half as smooth, but for those whose width is estimated; none where the model
+    /// smooths no other.
+    pub(crate) fn sharper(&self, values: &[f64]) -> Option<Vec<f64>> {
+        let parameters = self.model.parameters.iter();
+        let mut sharper = values.to_vec();
+        let mut any = false;
+        for (value, parameter) in sharper.iter_mut().zip(parameters) {
+            if parameter.declaration.is_width() && !parameter.free {
+                any = true;
+                *value /= SHARPER;
+            }
+        }
+        any.then_some(sharper)
     }
 }
+
+/// The share of a width that is left to see what it does: half of its way to none.
+pub(crate) const SHARPER: f64 = 2.0;

@@ -237,8 +237,10 @@ impl Problem<'_> {
         let n_signals = self.model.measured.len();
         let mut covariance =
             noise::covariance(&blocks, n_signals, &inverse, norms.len(), &self.work)?;
-        if let Some(shift) = self.shift(solution, &residual, &jacobian, &inverse)? {
-            shift.widen(&mut covariance);
+        for omission in self.omissions(solution)? {
+            if let Some(omitted) = self.omitted(&omission, &residual, &jacobian, &inverse)? {
+                omitted.widen(&mut covariance);
+            }
         }
         Ok(self.fit_of(&self.values_at(solution), &covariance, flatness))
     }

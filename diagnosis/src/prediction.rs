@@ -24,6 +24,31 @@ pub(crate) fn estimated_states(model: &Model, values: &[f64], runs: &[Run]) -> V
     )
 }
 
+/// Whether a free parameter moves what is measured at the start of a run whatever its initial state: the surroundings of
+/// a body whose state is how much warmer it is. Then a start that is held would hold the parameter, too.
+pub(crate) fn moves_starts(
+    model: &Model,
+    solution: &Solution,
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<bool, Cancelled> {
+    let free: Vec<usize> = (0..model.parameters.len())
+        .filter(|i| model.parameters[*i].free)
+        .collect();
+    let by = By {
+        parameters: &free,
+        states: &[],
+    };
+    for (run, x0) in runs.iter().zip(&solution.states) {
+        let first = run.part(0..run.len().min(1));
+        let found = sensitivities(model, &solution.values, x0.as_slice(), &first, by, work)?;
+        if found.jacobian.iter().any(|slope| *slope != 0.0) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
 /// The free run over `run` and its derivatives by some parameters and initial states.
 pub(crate) struct Sensitivities {
     /// Predictions, row by row: sample by sample, signal by signal.

@@ -1,13 +1,13 @@
 //! Corrections to a model once another effect was added to it.
 
-use loopsight_model::model::{Attached, Model};
+use loopsight_model::model::{Attached, Model, ModelParameter};
 use rayon::prelude::*;
 
-use crate::candidates::{is_width, smooth};
+use crate::candidates::smooth;
 use crate::compare::compare;
 use crate::conclusion::{Diagnosis, EffectAt};
 use crate::error::FitError;
-use crate::estimate::strength_is_determined;
+use crate::estimate::{Estimate, strength_is_determined};
 use crate::fitted::Fit;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
@@ -68,7 +68,7 @@ pub(crate) fn renames(
     };
     let close = best.work.criteria().choice.close;
     let candidates = spared(&best, steps);
-    Ok(best.takes(candidates, close)?.is_some())
+    Ok(best.takes(candidates, |_| close)?.is_some())
 }
 
 /// The models without one of the earlier steps' effects, by the index of the step.
@@ -89,7 +89,7 @@ fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<
     let close = best.work.criteria().choice.close;
     loop {
         let candidates = spared(best, steps);
-        match best.takes(candidates, close)? {
+        match best.takes(candidates, |_| close)? {
             Some(index) => drop(steps.remove(index)),
             None => return Ok(()),
         }
@@ -98,18 +98,24 @@ fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<
 
 /// Whether the log does not say how strong the effect of `step` is.
 pub(crate) fn is_undetermined(fit: &Fit, step: &ImprovementStep, undetermined: f64) -> bool {
+    !strength_is_determined(estimated(fit, step).into_iter(), undetermined)
+}
+
+/// The parameters of the effect of `step`, with their estimates.
+pub(crate) fn estimated<'f>(
+    fit: &'f Fit,
+    step: &ImprovementStep,
+) -> Vec<(&'f ModelParameter, &'f Estimate)> {
     let model = &fit.model;
-    let Some(place) = step.added.as_ref() else {
-        return false;
-    };
+    let instances = step.added.iter().flat_map(|place| instances(model, place));
     let of_effect = |i: usize| {
         let effect = &model.effects[i];
         let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
         model.parameters[own].iter()
     };
-    let estimated = (instances(model, place).into_iter().flat_map(of_effect))
-        .filter_map(|p| Some((p, fit.parameters.get(&p.name)?)));
-    !strength_is_determined(estimated, undetermined)
+    (instances.flat_map(of_effect))
+        .filter_map(|p| Some((p, fit.parameters.get(&p.name)?)))
+        .collect()
 }
 
 /// Whether an added effect takes from the log what it said of another one: a parameter of an effect that was determined
@@ -164,6 +170,7 @@ fn without(model: &Model, effects: &[usize]) -> Option<Model> {
 /// simpler effect.
 fn simplified(best: &mut Refined<'_>, steps: &mut [ImprovementStep]) -> Result<(), FitError> {
     let criteria = &best.work.criteria().choice;
+    let free = |model: &Model| model.parameters.iter().filter(|p| p.free).count();
     for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
         let instances = instances(best.model, place);
         let Some(effect) = instances.first().map(|i| &best.model.effects[*i]) else {
@@ -176,7 +183,9 @@ fn simplified(best: &mut Refined<'_>, steps: &mut [ImprovementStep]) -> Result<(
             });
             Some((*id, candidate?))
         });
-        if let Some(id) = best.takes(simpler.collect(), criteria.simpler)? {
+        let many = free(best.model);
+        let share = |model: &Model| criteria.allowance(many, free(model));
+        if let Some(id) = best.takes(simpler.collect(), share)? {
             id.clone_into(&mut place.effect);
         }
     }
@@ -199,7 +208,7 @@ fn reconsidered(
         let others = others.into_iter();
         let candidates =
             others.filter_map(|other| Some((other, exchanged(best.model, place, other)?)));
-        if let Some(other) = best.takes(candidates.collect(), criteria.better)? {
+        if let Some(other) = best.takes(candidates.collect(), |_| criteria.better)? {
             *place = other.clone();
         }
     }
@@ -235,7 +244,7 @@ pub(crate) fn still_open(
         Err(_) => return Ok(open),
         Ok((error, _)) => error / work.criteria().improve.better,
     };
-    for ((index, twin), ..) in no_worse(candidates, bar, measurements, &silent)? {
+    for ((index, twin), ..) in no_worse(candidates, |_| bar, measurements, &silent)? {
         open[index].push(twin.clone());
     }
     Ok(open)
@@ -286,12 +295,12 @@ struct Refined<'a> {
 }
 
 impl Refined<'_> {
-    /// Takes the best of the fitted `candidates` where its error is below `share` of the present one. Candidates
+    /// Takes the best of the fitted `candidates` whose error is below their `share` of the present one. Candidates
     /// that cannot be fitted, because their free run diverges, do not count.
     fn takes<T: Send>(
         &mut self,
         candidates: Vec<(T, Model)>,
-        share: f64,
+        share: impl Fn(&Model) -> f64 + Sync,
     ) -> Result<Option<T>, FitError> {
         if candidates.is_empty() {
             return Ok(None);
@@ -308,7 +317,8 @@ impl Refined<'_> {
             },
         };
         self.error = Some(now);
-        let fitted = no_worse(candidates, share * now, self.measurements, &silent)?;
+        let bar = |model: &Model| share(model) * now;
+        let fitted = no_worse(candidates, bar, self.measurements, &silent)?;
         let best = fitted.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
         Ok(best.map(|(what, error, model)| {
             *self.model = model;
@@ -333,7 +343,7 @@ fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
 /// fitted, because their free run diverges, are not among them.
 fn no_worse<T: Send>(
     candidates: Vec<(T, Model)>,
-    bar: f64,
+    bar: impl Fn(&Model) -> f64 + Sync,
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<Vec<(T, f64, Model)>, FitError> {
@@ -341,7 +351,7 @@ fn no_worse<T: Send>(
         .into_par_iter()
         .filter_map(|(what, model)| {
             let (error, model) = refitted(&model, measurements, work).ok()?;
-            (error <= bar).then_some((what, error, model))
+            (error <= bar(&model)).then_some((what, error, model))
         })
         .collect();
     // After a cancellation some were not tried.
@@ -386,12 +396,12 @@ fn sharpened(best: &mut Refined<'_>) -> Result<(), FitError> {
         let added = candidate.effects.iter().rev();
         let count = added.take_while(|e| e.meta.id == meta.id).count();
         let width = (0..meta.parameters.len())
-            .find(|i| is_width(&meta.parameters[*i]))
+            .find(|i| meta.parameters[*i].is_width())
             .and_then(|i| candidate.parameters[first + i].value);
         let Some(width) = width else { break };
         smooth(&mut candidate, count, 0.5 * width);
         if best
-            .takes(vec![((), candidate)], criteria.sharper)?
+            .takes(vec![((), candidate)], |_| criteria.sharper)?
             .is_none()
         {
             break;

@@ -175,7 +175,7 @@ impl Search<'_> {
     fn grows(&self, i: usize, from: usize) -> bool {
         let (candidate, other) = (&self.all[i], &self.all[from]);
         let contains =
-            is_special(other, candidate) && !candidate.separate && candidate.replaces.is_none();
+            other.is_special(candidate) && !candidate.separate && candidate.replaces.is_none();
         let divides =
             candidate.separate && candidate.meta.id == other.meta.id && candidate.at == other.at;
         (contains || divides) && !other.separate
@@ -282,7 +282,7 @@ fn contest(mut looked: Vec<(usize, Judged)>, criteria: &Criteria) -> Vec<Judged>
             best.candidate.at != found.candidate.at && error > criteria.elsewhere * best.error()
         });
         // A special case of one that did well may only need more iterations, so it may stay.
-        let special = |j: &Judged| is_special(&found.candidate, &j.candidate);
+        let special = |j: &Judged| found.candidate.is_special(&j.candidate);
         let best = finalists.first();
         let far = best.is_some_and(|best| error > criteria.behind * best.error())
             && !finalists.iter().any(special);
@@ -311,10 +311,5 @@ fn spares(other: &Candidate, candidate: &Candidate) -> bool {
     let wider = same
         && candidate.at.iter().all(|c| other.at.contains(c))
         && other.at.len() > candidate.at.len();
-    is_special(other, candidate) || alike || wider
-}
-
-/// Whether a candidate is contained in another one at its place.
-fn is_special(candidate: &Candidate, of: &Candidate) -> bool {
-    of.meta.simpler.contains(&candidate.meta.id) && of.at == candidate.at
+    other.is_special(candidate) || alike || wider
 }

@@ -88,6 +88,8 @@ pub(crate) struct Nominal<'a> {
     pub(crate) cost: f64,
     /// What candidates are ranked by.
     pub(crate) rank: &'a Losses,
+    /// Its initial states, where a short fit holds them.
+    pub(crate) held: Option<&'a [DVector<f64>]>,
     pub(crate) holdout: &'a Holdout<'a>,
     /// Reports no progress; stops each trial.
     pub(crate) work: &'a Work<'a>,
@@ -127,7 +129,7 @@ pub(crate) fn promise(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_
         model.parameters[*index].value = Some(start[*index]);
     }
     let states = &nominal.solution.states;
-    let mut problem = nominal.problem(&model, Some(states))?;
+    let mut problem = nominal.problem(&model, nominal.held)?;
     problem.positions = positions(candidate, start);
     let (before, after) = problem.promise(start, states).ok()??;
     let criteria = nominal.criteria();
@@ -149,12 +151,12 @@ fn positions(candidate: &Candidate, start: &[f64]) -> Option<Positions> {
         .flatten()
 }
 
-/// A quick fit of a candidate from one start, with the nominal initial states.
+/// A quick fit of a candidate from one start, with the nominal initial states where they can be held.
 pub(crate) fn look(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) -> Option<Judged> {
     nominal.work.go_on().ok()?;
     let model = coarse(candidate, LOOK_STEPS);
     let states = &nominal.solution.states;
-    let problem = || nominal.problem(&model, Some(states));
+    let problem = || nominal.problem(&model, nominal.held);
     let mut start = start.to_vec();
     if let Some(measured) = positions(candidate, &start) {
         let mut problem = problem()?;
@@ -208,14 +210,14 @@ pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fi
 }
 
 /// Fits the smoothing width of the sign as well, from where the fit without it ended. Otherwise an unusually soft
-/// sign would be taken for another effect. None where there is no sign.
+/// sign would be taken for another effect. None where there is no sign, or none that the integrator can follow.
 fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     let widths = first.candidate.own_widths();
     widths.first()?;
     for i in &widths {
         first.candidate.model.parameters[*i].free = true;
     }
-    let (mut judged, mut fit) = fully(first, nominal, f64::INFINITY)?;
+    let (mut judged, mut fit) = fully(first, nominal, nominal.criteria().wild)?;
     // From here on the widths are known parameters, as others are.
     for model in [&mut judged.candidate.model, &mut fit.model] {
         for i in &widths {

@@ -25,16 +25,18 @@ use crate::fitted::Fit;
 use crate::flatness::Flatness;
 use crate::holdout::Holdout;
 use crate::long::ENOUGH;
+use crate::omitted::{Omitted, SHARPER};
 use crate::prediction::Solution;
 use crate::problem::Problem;
 use crate::progress::{Cancelled, Work};
-use crate::timing::Shift;
 use crate::trial::FINAL;
 use crate::window::{bartlett, lags};
 
 /// Most steps, and most times that one is made shorter.
 const STEPS: usize = 4;
 const SHORTER: i32 = 3;
+/// Rows for what the model leaves out.
+const OMISSIONS: usize = 2;
 /// Groups of samples with a score of their own.
 const GROUPS: usize = ENOUGH / 8;
 
@@ -75,8 +77,8 @@ pub(crate) fn taken_on(
     Ok(Some((problem.solution(&at), fit)))
 }
 
-/// What is added up over all samples. The last row and column belong to a shift of the response in time, see
-/// [`Shift`].
+/// What is added up over all samples. The last two rows and columns belong to what the model leaves out, see
+/// [`Problem::omissions`]: a shift of the response in time, and sharp signs.
 struct Sums {
     /// `rᵀr`
     cost: f64,
@@ -91,7 +93,7 @@ struct Sums {
 impl Problem<'_> {
     /// The sums over all samples, at scaled unknowns.
     fn sums(&self, scaled: &DVector<f64>) -> Result<Sums, Cancelled> {
-        let n = scaled.len() + 1;
+        let n = scaled.len() + OMISSIONS;
         let mut sums = Sums {
             cost: 0.0,
             gram: DMatrix::zeros(n, n),
@@ -123,7 +125,7 @@ impl Problem<'_> {
         let own: Vec<usize> = (0..parameters)
             .chain(before..before + self.visible.len())
             .collect();
-        let shift = sums.right.len() - 1;
+        let all_unknowns = sums.right.len() - OMISSIONS;
         let mut simulators = self.simulators(own.len(), values, x0, run);
         let period = run.median_period();
         let group = self
@@ -135,10 +137,19 @@ impl Problem<'_> {
         let n_signals = self.weights.len();
         let mut predicted = vec![Dual::of(0.0); n_signals];
         let mut last = vec![0.0; n_signals];
-        let mut row = vec![0.0; own.len() + 1];
+        let mut row = vec![0.0; own.len() + OMISSIONS];
+        let mut sharp = self.sharper(values).map(|values| {
+            let mut simulator = Simulator::new(self.model, &values);
+            simulator.reset(x0, run.input(0));
+            simulator
+        });
+        let mut sharply = vec![0.0; n_signals];
         let mut gram = DMatrix::<f64>::zeros(row.len(), row.len());
         let mut score = DVector::<f64>::zeros(row.len());
-        let place = |local: usize| own.get(local).copied().unwrap_or(shift);
+        let place = |local: usize| match own.get(local) {
+            Some(place) => *place,
+            None => all_unknowns + local - own.len(),
+        };
         let mut slopes = vec![0.0; n_signals * own.len()];
         for k in 0..run.len() {
             self.work.go_on()?;
@@ -159,6 +170,15 @@ impl Problem<'_> {
                     simulator.correct(observer, k, run.sample(k), &predicted);
                 }
             }
+            if let Some(simulator) = &mut sharp {
+                if k > 0 {
+                    simulator.advance_to(run, k);
+                }
+                simulator.measure(&mut sharply);
+                if let Some(observer) = run.observer() {
+                    simulator.correct(observer, k, run.sample(k), &sharply);
+                }
+            }
             for (signal, y) in run.sample(k).iter().enumerate() {
                 let p = predicted[signal].value();
                 let change = if now > 0.0 {
@@ -177,6 +197,9 @@ impl Problem<'_> {
                     row[column] = -slope * weight * self.scales[own[column]];
                 }
                 row[own.len()] = change * weight;
+                if sharp.is_some() {
+                    row[own.len() + 1] = SHARPER * (p - sharply[signal]) * weight;
+                }
                 sums.cost += residual * residual;
                 for (i, a) in row.iter().enumerate() {
                     score[i] += a * residual;
@@ -186,7 +209,7 @@ impl Problem<'_> {
                 }
             }
             if (k + 1) % group == 0 || k + 1 == run.len() {
-                let mut all = DVector::zeros(shift + 1);
+                let mut all = DVector::zeros(sums.right.len());
                 for local in 0..row.len() {
                     all[place(local)] = score[local];
                 }
@@ -281,8 +304,12 @@ impl Problem<'_> {
         let meat = self.meat(sums);
         let mut covariance = &inverse * meat.view((0, 0), (n, n)) * &inverse;
         let criteria = &self.work.criteria().parameters;
-        if let Some(shift) = Shift::of_sums(&sums.gram, &sums.right, &meat, &inverse, criteria) {
-            shift.widen(&mut covariance);
+        let sums = (&sums.gram, &sums.right, &meat);
+        for (extra, known) in (n..).zip([criteria.clock, 1.0]) {
+            let omitted = Omitted::of_sums(sums, &inverse, extra, known, criteria.flat);
+            if let Some(omitted) = omitted {
+                omitted.widen(&mut covariance);
+            }
         }
         self.fit_of(&self.values_at(at), &covariance, flatness)
     }

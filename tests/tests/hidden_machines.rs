@@ -141,6 +141,32 @@ fn an_axis_whose_load_nobody_measures_lacks_the_spring() {
     assert!(best.nrmse < 0.2 * found.nominal.nrmse);
 }
 
+/// A model smooths the sign of friction, and the machine does not. What that does to the level is in its interval, and a
+/// width that is too small for the usual step does no harm.
+#[test]
+fn the_interval_of_a_friction_knows_that_its_sign_is_smoothed() {
+    let hidden = [(Hidden::CoulombFriction, 1.0)];
+    let found = |width: f64, seed: u64| {
+        let log = record(Robot::FlexibleJoint, &hidden, Experiment::Mixed, seed).unwrap();
+        let effect = format!(
+            "\n[[effect]]\n[effect.coulomb_friction]\nat = [\"motor\"]\nlevel = 0.1\nwidth = {width}\n"
+        );
+        let (model, _) = Model::from_toml("hidden", &(log.model_toml + &effect)).unwrap();
+        let runs = Measurements::new(std::slice::from_ref(&log.run));
+        let fit = fit(&model, &runs, &FitSettings::default(), &Work::quiet()).unwrap();
+        let level = &fit.parameters["coulomb_friction.level"];
+        let [low, high] = level.interval95.unwrap();
+        assert!(high > low && high - low < 0.06 * level.value, "{level:?}");
+        let truth = log.truth.hidden[0].fitted[0].value;
+        (low..=high).contains(&truth)
+    };
+    for width in [0.1, 0.005] {
+        let held = (41..=46).filter(|seed| found(width, *seed)).count();
+        println!("width {width} rad/s: {held} of 6 intervals hold the truth");
+        assert!(held >= 5, "width {width} rad/s: {held} of 6");
+    }
+}
+
 #[test]
 fn a_clean_joint_on_a_current_is_a_torque_axis() {
     explained(Robot::TorqueAxis);

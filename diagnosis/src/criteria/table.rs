@@ -157,7 +157,7 @@ criteria! {
         close: f64 = 1.01 "1", Judgement: "one per cent of an error does not matter in use";
         /// A simpler explanation may be worse by this share of what the best one leaves above the floor.
         blur: f64 = 0.3 "1", Judgement: "while much is missing, small differences may come from what else is missing";
-        /// Ratio of errors up to which a simpler effect takes the place of one that contains it.
+        /// Ratio of errors up to which a simpler effect takes the place of one that contains it, for each parameter less.
         simpler: f64 = 1.02 "1", Judgement: "one parameter less is worth two per cent";
         /// Ratio of errors beyond which two explanations are never the same, whatever their significance.
         never_same: f64 = 1.5 "1", Judgement: "one transient has too few samples for a test of significance";
