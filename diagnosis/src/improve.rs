@@ -93,9 +93,17 @@ fn improve_with(
             (Some(_), Some(best)) if round < work.criteria().improve.most => Some(best.clone()),
             _ => None,
         };
-        let before = diagnosis.nominal.nrmse;
+        let (before, floor) = (diagnosis.nominal.nrmse, diagnosis.floor.nrmse);
         state.diagnoses.push(diagnosis);
         let Some(best) = next else { break verdict };
+        // At the floor a further effect explains noise, or how the model is computed.
+        let Criteria {
+            improve, missing, ..
+        } = work.criteria();
+        let hardly = best.nrmse >= improve.better * before;
+        if round > 0 && hardly && before < missing.complete * floor {
+            break Conclusion::NothingMissing;
+        }
         // Something is missing, but hardly this.
         let tradeable = best.nrmse >= work.criteria().improve.worth_blurring * before;
         if tradeable && stands_in(best.parameters.values()) {

@@ -5,7 +5,7 @@ use super::stiff::{STABLE, Way};
 use crate::registry::HostReal;
 
 /// Share of the usual step below which none is shortened: friction that would need more has no sensible width.
-const SHORTEST: f64 = 0.125;
+const SHORTEST: f64 = 1.0 / 64.0;
 /// What a width is multiplied by, so that its effect has no slope.
 const WIDE: f64 = 1e9;
 
