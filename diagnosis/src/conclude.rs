@@ -149,7 +149,7 @@ impl Evidence<'_> {
 }
 
 /// The part of an error that an explanation removes when it leaves `left`: squared errors add up.
-fn explained(error: f64, left: f64) -> f64 {
+pub(crate) fn explained(error: f64, left: f64) -> f64 {
     (error.powi(2) - left.powi(2)).max(0.0).sqrt()
 }
 

@@ -12,7 +12,7 @@ use crate::measurements::Measurements;
 use crate::pairs::pair;
 use crate::progress::{Cancelled, Work};
 use crate::refine::{
-    blurs, estimated, is_undetermined, refine, renames, still_open, take_values, without_step,
+    blurs, estimated, is_undetermined, refine, still_open, take_values, without_step,
 };
 use crate::settings::{FitSettings, ImproveSettings, Method};
 use loopsight_model::model::Model;
@@ -70,7 +70,6 @@ fn improve_with(
                 done => done?,
             },
         };
-        let verdict = diagnosis.verdict;
         let round = state.diagnoses.len();
         // Beside an effect that was found, a further one is judged alone.
         if round == 0 {
@@ -89,26 +88,12 @@ fn improve_with(
                 }
             }
         }
-        let next = match (&diagnosis.missing, diagnosis.candidates.first()) {
-            (Some(_), Some(best)) if round < work.criteria().improve.most => Some(best.clone()),
-            _ => None,
-        };
-        let (before, floor) = (diagnosis.nominal.nrmse, diagnosis.floor.nrmse);
+        let next = worth_adding(&diagnosis, round, work.criteria());
         state.diagnoses.push(diagnosis);
-        let Some(best) = next else { break verdict };
-        // At the floor a further effect explains noise, or how the model is computed.
-        let Criteria {
-            improve, missing, ..
-        } = work.criteria();
-        let hardly = best.nrmse >= improve.better * before;
-        if round > 0 && hardly && before < missing.complete * floor {
-            break Conclusion::NothingMissing;
-        }
-        // Something is missing, but hardly this.
-        let tradeable = best.nrmse >= work.criteria().improve.worth_blurring * before;
-        if tradeable && stands_in(best.parameters.values()) {
-            break Conclusion::UnknownEffect;
-        }
+        let best = match next {
+            Ok(best) => best,
+            Err(verdict) => break verdict,
+        };
         match state.add(best, round, measurements, work) {
             Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
             // It is another name for what the model has, so nothing more is named.
@@ -117,6 +102,33 @@ fn improve_with(
         };
     };
     state.finish(verdict, measurements, work)
+}
+
+/// What the diagnosis of a `round` names, or the verdict where that is not worth adding.
+fn worth_adding(
+    diagnosis: &Diagnosis,
+    round: usize,
+    criteria: &Criteria,
+) -> Result<Explanation, Conclusion> {
+    let Criteria {
+        improve, missing, ..
+    } = criteria;
+    let best = match (&diagnosis.missing, diagnosis.candidates.first()) {
+        (Some(_), Some(best)) if round < improve.most => best,
+        _ => return Err(diagnosis.verdict),
+    };
+    let (before, floor) = (diagnosis.nominal.nrmse, diagnosis.floor.nrmse);
+    let fell_to = best.nrmse / before;
+    // At the floor a further effect explains noise, or how the model is computed.
+    let complete = round > 0 && before < missing.complete * floor;
+    if complete && fell_to >= improve.better {
+        return Err(Conclusion::NothingMissing);
+    }
+    // Something is missing, but hardly this.
+    if fell_to >= improve.worth_blurring && stands_in(best.parameters.values()) {
+        return Err(Conclusion::UnknownEffect);
+    }
+    Ok(best.clone())
 }
 
 /// Whether work failed because the free run of the model diverges.
@@ -204,19 +216,14 @@ impl State {
         work: &Work<'_>,
     ) -> Result<bool, FitError> {
         self.step(best, round);
-        let work = work.in_round(round);
-        if renames(&self.present, &self.steps, measurements, &work)? && self.take_back() {
-            return Ok(false);
-        }
-        let earlier = &self.diagnoses[..round];
-        refine(
+        let stays = refine(
             &mut self.present,
             &mut self.steps,
-            earlier,
+            &self.diagnoses[..round],
             measurements,
-            &work,
+            &work.in_round(round),
         )?;
-        Ok(true)
+        Ok(stays || !self.take_back())
     }
 
     /// Says of each step what the data still cannot tell from its effect in the finished `model`.

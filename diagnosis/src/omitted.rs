@@ -15,21 +15,23 @@ use crate::progress::Cancelled;
 /// Standard errors beyond which an omission counts: `√2`, from where a model with it predicts better (H. Akaike, 1974,
 /// "A new look at the statistical model identification").
 const EARNED: f64 = std::f64::consts::SQRT_2;
+/// What a width is divided by to see what it does. That goes half of the way to a sharp sign, so the change is doubled.
+pub(crate) const SHARPER: f64 = 2.0;
 
-/// Something that the model leaves out, as it stands in a linearised fit.
+/// Something that a model leaves out.
+pub(crate) struct Omission {
+    /// The change of the residuals with it.
+    direction: DVector<f64>,
+    /// The size that it may have where the log cannot tell it better.
+    known: f64,
+}
+
+/// What it does to a fit.
 pub(crate) struct Omitted {
     /// Change of the unknowns with it.
     along: DVector<f64>,
     /// Its size.
     size: f64,
-}
-
-/// Something that a model leaves out.
-pub(crate) struct Omission {
-    /// The change of the residuals with it.
-    pub(crate) direction: DVector<f64>,
-    /// The size that it may have where the log cannot tell it better.
-    pub(crate) known: f64,
 }
 
 /// The size of what was found with a standard error, where it is `known` to so much. None where it is chance.
@@ -124,27 +126,18 @@ impl Problem<'_> {
     /// its way that the smoothing of signs goes to none.
     pub(crate) fn omissions(&self, at: &DVector<f64>) -> Result<Vec<Omission>, Cancelled> {
         let (values, states) = self.unpack(at);
+        let predicted = self.free_runs(&values, &states)?;
         let sharper = self.sharper(&values);
+        let sharp = sharper.map(|values| self.free_runs(&values, &states));
+        let sharp = sharp.transpose()?;
         let n = self.model.measured.len();
         let rows: usize = self.runs.iter().map(|run| run.len() * n).sum();
         // The columns are that of the shift and that of the sharp signs.
-        let columns = 1 + usize::from(sharper.is_some());
+        let columns = 1 + usize::from(sharp.is_some());
         let mut directions = DMatrix::zeros(rows, columns);
         let mut first_row = 0;
-        for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
-            let x0 = x0.as_slice();
-            let predict = |values: &[f64]| {
-                predict_with(
-                    self.positions.as_ref(),
-                    self.model,
-                    values,
-                    x0,
-                    run,
-                    &self.work,
-                )
-            };
-            let predicted = predict(&values)?;
-            let sharp = sharper.as_deref().map(predict).transpose()?;
+        for (index, (run, predicted)) in self.runs.iter().zip(&predicted).enumerate() {
+            let sharp = sharp.as_ref().map(|sharp| &sharp[index]);
             let time = run.time();
             let period = run.median_period();
             for k in 0..run.len() {
@@ -162,7 +155,7 @@ impl Problem<'_> {
                         let change = predicted[after * n + signal] - predicted[before * n + signal];
                         directions[(to, 0)] = change / span * period * weight;
                     }
-                    if let Some(sharp) = &sharp {
+                    if let Some(sharp) = sharp {
                         directions[(to, 1)] = SHARPER * (predicted[row] - sharp[row]) * weight;
                     }
                 }
@@ -177,6 +170,27 @@ impl Problem<'_> {
             known,
         });
         Ok(omissions.collect())
+    }
+
+    /// The free runs with these values, from these initial states.
+    fn free_runs(
+        &self,
+        values: &[f64],
+        states: &[DVector<f64>],
+    ) -> Result<Vec<Vec<f64>>, Cancelled> {
+        let positions = self.positions.as_ref();
+        let runs = self.runs.iter().zip(states);
+        runs.map(|(run, x0)| {
+            predict_with(
+                positions,
+                self.model,
+                values,
+                x0.as_slice(),
+                run,
+                &self.work,
+            )
+        })
+        .collect()
     }
 
     /// The parameter `values` with all signs half as smooth, but for those whose width is estimated; none where the model
@@ -194,6 +208,3 @@ impl Problem<'_> {
         any.then_some(sharper)
     }
 }
-
-/// The share of a width that is left to see what it does: half of its way to none.
-pub(crate) const SHARPER: f64 = 2.0;

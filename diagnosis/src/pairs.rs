@@ -3,6 +3,7 @@
 //! Dry friction behind a motor driver that lets go between its pulses is one: without friction such a driver hardly
 //! shows in steady speeds, and friction alone makes slow motion worse while it makes fast motion better.
 
+use crate::conclude::explained;
 use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::Criteria;
 use crate::diagnose::{Aim, Discover, diagnose_for};
@@ -90,8 +91,7 @@ fn left_by(
     // Errors are only compared under the same observer.
     let alike = second.observer.is_some() == diagnosis.observer.is_some();
     let (before, left, floor) = (diagnosis.nominal.nrmse, found.nrmse, diagnosis.floor.nrmse);
-    let explained = (before * before - left * left).max(0.0).sqrt();
-    let matters = explained > (criteria.missing.matters * floor).max(aim.least);
+    let matters = explained(before, left) > (criteria.missing.matters * floor).max(aim.least);
     (alike && matters && left < criteria.improve.better * before).then_some(left)
 }
 

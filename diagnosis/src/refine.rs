@@ -23,14 +23,15 @@ use crate::settings::FitSettings;
 ///   `diagnoses` of the earlier steps name them);
 /// * the sign of the last effect is made sharper while the error falls.
 ///
-/// The steps are changed with the model. If the work is cancelled, the two still agree.
+/// The steps are changed with the model. If the work is cancelled, the two still agree. False where the last step is no
+/// more than another name for an earlier one; then nothing is changed.
 pub(crate) fn refine(
     model: &mut Model,
     steps: &mut Vec<ImprovementStep>,
     diagnoses: &[Diagnosis],
     measurements: &Measurements<'_>,
     work: &Work<'_>,
-) -> Result<(), FitError> {
+) -> Result<bool, FitError> {
     let mut best = Refined {
         model,
         error: None,
@@ -38,37 +39,13 @@ pub(crate) fn refine(
         work,
         changes: 0,
     };
-    needless(&mut best, steps)?;
-    simplified(&mut best, steps)?;
-    reconsidered(&mut best, steps, diagnoses)?;
-    sharpened(&mut best)
-}
-
-/// Whether the last of `steps` is no more than another name for an earlier one: without that one the error is the same,
-/// and the last step hardly lowered it. What else is missing may decide between the two then, so the earlier one stays.
-pub(crate) fn renames(
-    model: &Model,
-    steps: &[ImprovementStep],
-    measurements: &Measurements<'_>,
-    work: &Work<'_>,
-) -> Result<bool, FitError> {
-    let [.., before, last] = steps else {
-        return Ok(false);
-    };
-    if last.nrmse_test < work.criteria().improve.better * before.nrmse_test {
+    if !needless(&mut best, steps)? {
         return Ok(false);
     }
-    let mut model = model.clone();
-    let mut best = Refined {
-        model: &mut model,
-        error: None,
-        measurements,
-        work,
-        changes: 0,
-    };
-    let close = best.work.criteria().choice.close;
-    let candidates = spared(&best, steps);
-    Ok(best.takes(candidates, |_| close)?.is_some())
+    simplified(&mut best, steps)?;
+    reconsidered(&mut best, steps, diagnoses)?;
+    sharpened(&mut best)?;
+    Ok(true)
 }
 
 /// The models without one of the earlier steps' effects, by the index of the step.
@@ -85,15 +62,25 @@ fn spared(best: &Refined<'_>, steps: &[ImprovementStep]) -> Vec<(usize, Model)> 
 
 /// Removes effects of earlier steps without which the error is the same: what looked like a dead zone may have
 /// been part of the friction that was added after it.
-fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<(), FitError> {
-    let close = best.work.criteria().choice.close;
-    loop {
-        let candidates = spared(best, steps);
-        match best.takes(candidates, |_| close)? {
-            Some(index) => drop(steps.remove(index)),
-            None => return Ok(()),
+///
+/// Where the last step itself hardly lowered the error, it is another name for such an effect. What else is missing may
+/// decide between the two then, so nothing is removed. Whether the last step stays.
+fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<bool, FitError> {
+    let criteria = best.work.criteria();
+    let (close, better) = (criteria.choice.close, criteria.improve.better);
+    let hardly = match &steps[..] {
+        [.., before, last] => last.nrmse_test >= better * before.nrmse_test,
+        _ => false,
+    };
+    let all = best.model.clone();
+    while let Some(index) = best.takes(spared(best, steps), |_| close)? {
+        if hardly {
+            *best.model = all;
+            return Ok(false);
         }
+        steps.remove(index);
     }
+    Ok(true)
 }
 
 /// Whether the log does not say how strong the effect of `step` is.
