@@ -18,6 +18,8 @@ use crate::score::Tally;
 ///   neighbours and between every other sample: neighbours of noise that alternates (differences of counts)
 ///   differ by more than white noise of the same size would, every other sample does not. The noise is never below
 ///   the rounding of the log, its least change `q` over `√12`.
+/// * A sensor may be noisier while the machine moves (a speed by a differentiating filter, which is quiet at rest). So
+///   medians are those of short blocks, and their squares are averaged.
 /// * A coarse log, which changes by one step of `q` or two at a time, has its noise in few values. Then the median
 ///   is that of grouped data: values are spread evenly over their step, and what that adds, `q²/12`, is taken off.
 /// * A sensor that is read more often than it has a new value (a bus that updates every 20 ms): the age of its
@@ -94,19 +96,20 @@ pub(crate) fn noise(
     let noise = match sensor {
         Sensor::EncoderCounts(encoder) => encoder.noise(period),
         Sensor::Instantaneous | Sensor::IntervalMean => {
-            let steps = sizes(&changing, 1, 1);
+            let steps = changes(&changing);
             let step = least(&steps, tally.rms());
             let rounding = step / 12f64.sqrt();
             if median(steps) <= COARSE * step {
                 white(&every, step).max(rounding)
             } else {
                 let hold = median(holds);
-                let age = if hold > criteria.repeats_periods * period {
-                    rate.rms() * hold / 12f64.sqrt()
+                if hold > criteria.repeats_periods * period {
+                    let age = rate.rms() * hold / 12f64.sqrt();
+                    white(&changing, 0.0).max(rounding).hypot(age)
                 } else {
-                    0.0
-                };
-                white(&changing, 0.0).max(rounding).hypot(age)
+                    // What it repeats now and then, while the machine rests, it reads all the same.
+                    white(&every, 0.0).max(rounding)
+                }
             }
         }
     };
@@ -130,7 +133,7 @@ pub(crate) fn rounding(sensor: &Sensor, signal: usize, runs: &[Run]) -> f64 {
             all.push(values);
         }
     }
-    least(&sizes(&all, 1, 1), tally.rms()) / 12f64.sqrt()
+    least(&changes(&all), tally.rms()) / 12f64.sqrt()
 }
 
 /// Orders of the differences.
@@ -146,28 +149,42 @@ fn white(runs: &[Vec<f64>], step: f64) -> f64 {
     let least = (1..=ORDERS)
         .flat_map(|order| (1..=SPACINGS).map(move |spacing| (order, spacing)))
         .filter_map(|(order, spacing)| {
-            let sizes = sizes(runs, order, spacing);
-            let spread = (!sizes.is_empty()).then(|| grouped_median(sizes, step) / 0.6745)?;
-            let grouped = step * step / 12.0;
-            Some(((spread * spread - grouped).max(0.0) / gain(order)).sqrt())
+            let sizes: Vec<Vec<f64>> = runs.iter().map(|r| sizes(r, order, spacing)).collect();
+            let blocks = || sizes.iter().flat_map(|run| run.chunks(block(run.len())));
+            let variance = |block: &[f64]| {
+                let spread = grouped_median(block.to_vec(), step) / 0.6745;
+                (spread * spread - step * step / 12.0).max(0.0) / gain(order)
+            };
+            let count: usize = blocks().map(<[f64]>::len).sum();
+            let sum: f64 = blocks().map(|b| b.len() as f64 * variance(b)).sum();
+            (count > 0).then(|| (sum / count as f64).sqrt())
         })
         .fold(f64::INFINITY, f64::min);
     if least.is_finite() { least } else { 0.0 }
 }
 
+/// Values whose median tells the noise: with fewer, its own error of `1.25/√n` would count.
+const BLOCK: usize = 100;
+
+/// The length of the blocks of `n` values: all alike, and none much shorter than [`BLOCK`].
+fn block(n: usize) -> usize {
+    n.div_ceil((n / BLOCK).max(1)).max(1)
+}
+
 /// Sizes of the differences of an order, of values that are `spacing` samples apart.
-fn sizes(runs: &[Vec<f64>], order: usize, spacing: usize) -> Vec<f64> {
-    let of_run = |values: &Vec<f64>| {
-        let mut left = values.clone();
-        for _ in 0..order {
-            left = (left.iter().zip(left.iter().skip(spacing)))
-                .map(|(before, after)| after - before)
-                .collect();
-        }
-        left
-    };
-    let all = runs.iter().flat_map(of_run);
-    all.map(f64::abs).collect()
+fn sizes(values: &[f64], order: usize, spacing: usize) -> Vec<f64> {
+    let mut left = values.to_vec();
+    for _ in 0..order {
+        left = (left.iter().zip(left.iter().skip(spacing)))
+            .map(|(before, after)| after - before)
+            .collect();
+    }
+    left.into_iter().map(f64::abs).collect()
+}
+
+/// Sizes of the changes from one value to the next.
+fn changes(runs: &[Vec<f64>]) -> Vec<f64> {
+    runs.iter().flat_map(|values| sizes(values, 1, 1)).collect()
 }
 
 /// Variance of the differences of an order of white noise of variance 1: `(2n)!/(n!)²`.
@@ -271,6 +288,27 @@ mod tests {
             .map(|k| (motion(k / 40) * 2.0).round() / 2.0)
             .collect());
         assert!(rounded >= 0.5 / 12f64.sqrt() - 1e-12, "{rounded}");
+    }
+
+    /// White in motion, which is two seconds of five, and none at rest.
+    #[test]
+    fn noise_that_comes_with_motion_counts_as_often_as_it_is_there() {
+        let mut state = 7u64;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let moves = |k: usize| k / 100 % 5 < 2;
+        let measured: Vec<f64> = (0..4000)
+            .map(|k| {
+                let q: f64 = (0..12).map(|_| uniform()).sum();
+                f64::from(u8::from(moves(k))) * (10.0 * (0.06 * k as f64).sin() + q)
+            })
+            .collect();
+        let (found, truth) = (of(measured), 0.4f64.sqrt());
+        assert!((found / truth - 1.0).abs() < 0.15, "{found} {truth}");
     }
 
     /// A sine of amplitude 1 and 2 rad/s, read every 5 ms, new every 20 ms.
