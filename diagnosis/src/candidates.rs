@@ -51,6 +51,12 @@ impl Candidate {
         if self.separate { self.at.len() } else { 1 }
     }
 
+    /// Whether it is the same as another candidate, but for its values.
+    pub(crate) fn is_again(&self, other: &Self) -> bool {
+        let what = |c: &Self| (c.meta.id, c.separate, c.replaces.clone());
+        what(self) == what(other) && self.at == other.at
+    }
+
     /// Whether it is contained in another candidate at its place.
     pub(crate) fn is_special(&self, of: &Self) -> bool {
         of.meta.simpler.contains(&self.meta.id) && of.at == self.at

@@ -11,7 +11,7 @@ use crate::criteria::{Criteria, SearchCriteria};
 use crate::explain::explain;
 use crate::judge::nrmse;
 use crate::progress::{Stage, Work};
-use crate::starts::{Extent, first_starts, fresh_starts, grown_starts};
+use crate::starts::{Extent, first_starts, fresh_starts, starts_from};
 use crate::trial::{Judged, Nominal, finish, look, promise};
 
 /// A candidate by its index, and where to start it from.
@@ -54,14 +54,16 @@ impl Search<'_> {
         let mut finalists: Vec<(Judged, Explanation)> = contest
             .par_iter()
             .filter_map(|first| {
-                let (judged, fit) = finish(first.clone(), self.nominal)?;
-                let explanation = explain(&judged, &fit, self.nominal).ok()?;
+                let found = self.finished(first.clone());
                 self.tell(Stage::Finalists, &done, of);
-                // An effect whose fitted size is nothing explains nothing, whatever the other parameters gained.
-                let least = self.criteria().does_nothing;
-                does_something(&explanation, least).then_some((judged, explanation))
+                found
             })
             .collect();
+        finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
+        for found in self.shrunk(&finalists) {
+            finalists.retain(|(other, _)| !other.candidate.is_again(&found.0.candidate));
+            finalists.push(found);
+        }
         finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
         let looked = if self.work.is_cancelled() {
             contest
@@ -73,6 +75,51 @@ impl Search<'_> {
 
     fn criteria(&self) -> &SearchCriteria {
         &self.work.criteria().search
+    }
+
+    /// The full fit of a candidate. An effect whose fitted size is nothing explains nothing, whatever the other
+    /// parameters gained.
+    fn finished(&self, first: Judged) -> Option<(Judged, Explanation)> {
+        let (judged, fit) = finish(first, self.nominal)?;
+        let explanation = explain(&judged, &fit, self.nominal).ok()?;
+        let least = self.criteria().does_nothing;
+        does_something(&explanation, least).then_some((judged, explanation))
+    }
+
+    /// Special cases of the best of `finalists` that ended behind it, fitted anew from where it ended: what it found,
+    /// they may have missed. Those that come near it then.
+    fn shrunk(&self, finalists: &[(Judged, Explanation)]) -> Vec<(Judged, Explanation)> {
+        let alone = |(best, _): &&(Judged, Explanation)| best.candidate.replaces.is_none();
+        let Some((best, _)) = finalists.first().filter(alone) else {
+            return Vec::new();
+        };
+        let choice = &self.work.criteria().choice;
+        let near = |special: &Candidate| {
+            let allowance = choice.allowance(best.candidate.complexity(), special.complexity());
+            allowance * best.error()
+        };
+        let missed = |candidate: &&Candidate| {
+            let is_near = |other: &Judged| {
+                other.candidate.is_again(candidate) && other.error() <= near(candidate)
+            };
+            candidate.is_special(&best.candidate)
+                && candidate.separate == best.candidate.separate
+                && candidate.replaces.is_none()
+                && !finalists.iter().any(|(other, _)| is_near(other))
+        };
+        let extent = Extent::of(self.nominal.holdout.runs);
+        let fitted = |candidate: &Candidate| {
+            let starts = starts_from(candidate, best, extent);
+            let looks = starts
+                .iter()
+                .filter_map(|start| look(&candidate.chosen(start), start, self.nominal));
+            let first = looks.min_by(|a, b| a.error().total_cmp(&b.error()))?;
+            let found = self.finished(first)?;
+            (found.0.error() <= near(candidate)).then_some(found)
+        };
+        (self.all.par_iter().filter(missed))
+            .filter_map(fitted)
+            .collect()
     }
 
     /// One more is done of a stage.
@@ -206,7 +253,7 @@ impl Search<'_> {
             });
             let elsewhere = error > criteria.elsewhere * least(places);
             let divided = error < criteria.worth_dividing * nrmse(self.nominal.rank);
-            let starts = grown_starts(candidate, simpler, extent);
+            let starts = starts_from(candidate, simpler, extent);
             let worth = error < criteria.worth_growing * least_of_all
                 && (!candidate.separate || divided)
                 && starts.len() <= criteria.grown_starts;

@@ -65,21 +65,28 @@ pub(crate) fn first_starts(
     starts(candidate, &base, &known, extent)
 }
 
-/// Starting values of a candidate that has nothing to do with what the plain model was fitted to, where that fit got
-/// lost: a sensor that does not know the sign turns half of the motion round. They are those of the model as it was
-/// given, and those of its fit to the log with the sign that each input suggests.
+/// Starting values of a candidate that have nothing to do with what the plain model was fitted to, where that fit got
+/// lost: those of the model as it was given. A pendulum without friction swings on, and a fit to it ends anywhere.
+///
+/// A sensor that does not know the sign turns half of the motion round. It begins with a fit to the log with the sign that
+/// each input suggests, too.
 pub(crate) fn fresh_starts(
     candidate: &Candidate,
     nominal: &Nominal<'_>,
     extent: Extent,
 ) -> Vec<Vec<f64>> {
     let lost = nrmse(nominal.rank) > nominal.work.criteria().start.lost;
-    if candidate.meta.shows != Shows::NeverNegative || !lost {
+    let given = nominal.given;
+    if !lost || candidate.replaces.is_some() {
         return Vec::new();
     }
-    let given = nominal.given;
+    let folded = candidate.meta.shows == Shows::NeverNegative;
+    if !folded && !given.missing_values().is_empty() {
+        return Vec::new();
+    }
     let mut bases = vec![declared(given)];
-    for input in 0..given.plant.inputs.len() {
+    let inputs = if folded { given.plant.inputs.len() } else { 0 };
+    for input in 0..inputs {
         let mut runs = nominal.holdout.runs.to_vec();
         for signal in measured_at(given, &candidate.at) {
             runs = unfolded(&runs, signal, input);
@@ -110,15 +117,11 @@ fn measured_at(model: &Model, at: &[&str]) -> Vec<usize> {
     channels.filter_map(signal).collect()
 }
 
-/// Values to start a candidate from where `simpler` ended.
-pub(crate) fn grown_starts(
-    candidate: &Candidate,
-    simpler: &Judged,
-    extent: Extent,
-) -> Vec<Vec<f64>> {
-    let own = simpler.candidate.own();
-    let values = &simpler.solution.values;
-    let declarations = simpler.candidate.meta.parameters.iter();
+/// Values to start a candidate from where another one ended, whose parameters of the same id mean the same.
+pub(crate) fn starts_from(candidate: &Candidate, other: &Judged, extent: Extent) -> Vec<Vec<f64>> {
+    let own = other.candidate.own();
+    let values = &other.solution.values;
+    let declarations = other.candidate.meta.parameters.iter();
     let known = declarations
         .map(|declaration| declaration.id)
         .zip(values[own.clone()].iter().copied())
