@@ -75,6 +75,8 @@ fn in_two_passes(problem: &mut Problem<'_>, settings: &FitSettings) -> Result<Fi
     if let Some(start) = problem.whiten(&solution)? {
         let start = problem.balance(start)?;
         (solution, settled) = problem.solve_and_tell(&start, effort)?;
+    } else if problem.reweigh_starts(&solution)? {
+        (solution, settled) = problem.solve_and_tell(&solution, effort)?;
     }
     let mut fit = problem.result(&solution)?;
     let hopeless = problem.work.criteria().start.hopeless;

@@ -40,7 +40,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) cache: RefCell<Option<Linearised>>,
     pub(crate) samples: f64,
     /// How many times as much the first sample of a run counts, by run and signal.
-    first: Vec<Vec<f64>>,
+    pub(crate) first: Vec<Vec<f64>>,
     /// Samples that the fit may see, by run; all where there is none.
     seen: Option<&'a [Vec<bool>]>,
     /// Initial states that are not estimated, by run.

@@ -24,6 +24,11 @@ pub(crate) const FINAL: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
 };
+/// That of its second pass, which begins near its end.
+const AGAIN: Effort = Effort {
+    iterations: 5,
+    tolerance: FINAL.tolerance,
+};
 /// Longest integration steps of a promise and of a look, in steps of the plant. Where the effect reads a position
 /// both take the shorter one, because a long step could skip a cog.
 const PROMISE_STEPS: f64 = 4.0;
@@ -238,7 +243,10 @@ fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit
         return None;
     }
     let start = problem.balance(start).ok()?;
-    let found = problem.solve(&start, FINAL).ok()?;
+    let mut found = problem.solve(&start, FINAL).ok()?;
+    if problem.reweigh_starts(&found).ok()? {
+        found = problem.solve(&found, AGAIN).ok()?;
+    }
     if problem.steepness(&found).ok()? > wild {
         return None;
     }

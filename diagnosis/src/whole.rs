@@ -282,7 +282,7 @@ impl Problem<'_> {
     }
 
     /// The directions that the sums do not determine, and the inverse of the others.
-    fn flat(&self, gram: &DMatrix<f64>) -> (Flatness, DMatrix<f64>) {
+    pub(crate) fn flat(&self, gram: &DMatrix<f64>) -> (Flatness, DMatrix<f64>) {
         let norms: Vec<f64> = (0..gram.ncols()).map(|i| gram[(i, i)].sqrt()).collect();
         let criteria = &self.work.criteria().parameters;
         let flatness = Flatness::of(gram, &norms, &self.named(), criteria);
