@@ -26,8 +26,8 @@ use loopsight_core::{
 /// included) and the flow `K` of the pump per volt, `b = K/A_1`.
 ///
 /// Torricelli's law `√(2 g h)` has no derivative in an empty tank. There it is made smooth, as the flow of
-/// a film is slow: `f(h) = √(2 g) h/(h² + h_0²)^¼` with `h_0` = 1 mm, which differs by `(h_0/h)²/4`,
-/// 2.5e-5 at 10 cm.
+/// a film is slow: `f(h) = √(2 g) h/(h² + h_0²)^¼` with `h_0` = 0.1 mm, which differs by `(h_0/h)²/4`,
+/// 2.5e-5 at 1 cm.
 ///
 /// Assumptions: prismatic tanks that do not overflow (that is an effect, `overflow`), outlets that are short; a pump
 /// without dynamics.
@@ -40,7 +40,7 @@ pub struct TankPair;
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.806_65;
 /// Head below which an outlet only drips, m.
-const FILM: f64 = 1e-3;
+const FILM: f64 = 1e-4;
 
 const LUMPED: [Parameter; 4] = [
     Parameter::new(
@@ -198,7 +198,7 @@ impl Plant for TankPair {
         summary: "two tanks in cascade, the upper one filled by a pump",
         equation: "h'_1 = b u - c_1 √(2 g h_1);  h'_2 = c_2 √(2 g h_1) - c_3 √(2 g h_2)",
         reference: "Schoukens, Noël (2017), IFAC PapersOnLine 50-1, 446-451, section 3 (cascaded tanks)",
-        assumptions: "prismatic tanks that do not overflow, Torricelli's law made smooth below 1 mm",
+        assumptions: "prismatic tanks that do not overflow, Torricelli's law made smooth below 0.1 mm",
         example: "[plant.tank_pair]\npump = 2.0e-3\noutlet_upper = 4.0e-3\ninlet_lower = 4.0e-3\noutlet_lower = 3.5e-3\n",
         states: &[
             Signal::new("level_upper", "h_1", "m", "level of the upper tank").sized(0.1),
@@ -230,7 +230,7 @@ impl Plant for TankPair {
         controlled: &[],
     };
 
-    /// A film of 1 mm runs off in some 5 s.
+    /// A film of 0.1 mm runs off in half a second or slower.
     const MAX_STEP_S: f64 = 0.25;
 
     const DERIVED: &'static [Derived] = &[
