@@ -69,8 +69,6 @@ the median over the effect's parameters that have an interval, where the truth h
 `in the interval` counts those whose 95 % interval holds the truth. The windings of these machines have a
 time constant of 0.1 ms that no model knows of: it is too little to be seen, but delays and lags take it for
 their own, and friction under pseudo-random voltages that reverse at once. `--windings 1e-6` is without.
-`torque_axis` is diagnosed in amperes here, since `[log]` is not read: its level is twice that in newton metres, and
-counts as wrong by 100 %.
 
 ";
 

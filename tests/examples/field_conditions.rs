@@ -10,14 +10,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use loopsight_core::Signal;
 use loopsight_diagnosis::{Diagnosis, Measurements, Work, diagnose};
 use loopsight_hidden::{Driven, Experiment, Hidden, Live, PERIOD, Recording, Robot, record_along};
 use loopsight_model::excitation::Excitation;
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_plants as _;
-use loopsight_recordings::{Source, map, read_csv_from};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -186,16 +184,7 @@ fn csv(rows: &[Row], columns: &[String]) -> String {
 /// The diagnosis of a log as it would be read from a file.
 fn diagnosed(toml: &str, text: &str) -> Option<Diagnosis> {
     let (model, _) = Model::from_toml("hidden", toml).ok()?;
-    let table = read_csv_from(text.as_bytes(), "field.csv").ok()?;
-    let signals = model.plant.states.iter().chain(model.plant.outputs);
-    let signals: Vec<Signal> = signals.copied().collect();
-    let log = map(
-        &Source::Table(table),
-        model.plant.inputs,
-        &signals,
-        &model.log,
-    )
-    .ok()?;
+    let log = blind::read(&model, text)?;
     let measurements = Measurements::new(&log.runs).with_faults(&log.faults);
     diagnose(&model, &measurements, &Work::quiet()).ok()
 }

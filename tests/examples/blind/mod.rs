@@ -1,12 +1,15 @@
 //! One blind recording: made, diagnosed, and whether the diagnosis is right.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
+use loopsight_core::Signal;
 use loopsight_diagnosis::{
     Conclusion, Criteria, Diagnosis, EffectAt, Explanation, Measurements, Work, diagnose,
 };
 use loopsight_hidden::{Experiment, Hidden, Recording, Robot, record_with, refit};
 use loopsight_model::model::Model;
+use loopsight_recordings::{Source, map, read_csv_from};
 
 /// A refit of the plain model leaves less than this multiple of the floor: nothing shows.
 pub(crate) const INVISIBLE: f64 = 1.15;
@@ -66,8 +69,9 @@ impl Recorded {
     /// What a diagnosis by these criteria says.
     pub(crate) fn diagnose(&self, criteria: &Criteria) -> Option<Diagnosis> {
         let (model, _) = Model::from_toml("hidden", &self.log.model_toml).ok()?;
-        let (runs, tests) = ([self.log.run.clone()], [self.test.run.clone()]);
-        let measurements = Measurements::new(&runs).tested_on(Some(&tests));
+        let [log, test] = [&self.log, &self.test].map(|log| read(&model, &csv(log)));
+        let (log, test) = (log?, test?);
+        let measurements = Measurements::new(&log.runs).tested_on(Some(&test.runs));
         diagnose(&model, &measurements, &Work::quiet().decided_by(criteria)).ok()
     }
 
@@ -88,6 +92,27 @@ impl Recorded {
             Some(truth) => named(diagnosis, truth.effect.id(), &truth.at),
         }
     }
+}
+
+/// A log as it would be read from a file, in the units of the model.
+pub(crate) fn read(model: &Model, csv: &str) -> Option<loopsight_recordings::Recording> {
+    let table = read_csv_from(csv.as_bytes(), "hidden.csv").ok()?;
+    let signals = model.plant.states.iter().chain(model.plant.outputs);
+    let signals: Vec<Signal> = signals.copied().collect();
+    let source = Source::Table(table);
+    map(&source, model.plant.inputs, &signals, &model.log).ok()
+}
+
+/// A recording as a CSV of all digits.
+fn csv(log: &Recording) -> String {
+    let mut text = log.columns().join(",");
+    for k in 0..log.run.len() {
+        let _ = write!(text, "\n{}", log.run.time()[k]);
+        for value in log.run.input(k).iter().chain(log.run.sample(k)) {
+            let _ = write!(text, ",{value}");
+        }
+    }
+    text
 }
 
 /// Whether the missing effect, or one that the diagnosis says it cannot tell from it, is the true
