@@ -53,8 +53,10 @@ impl Candidate {
 
     /// Whether it is the same as another candidate, but for its values.
     pub(crate) fn is_again(&self, other: &Self) -> bool {
-        let what = |c: &Self| (c.meta.id, c.separate, c.replaces.clone());
-        what(self) == what(other) && self.at == other.at
+        self.meta.id == other.meta.id
+            && self.at == other.at
+            && self.separate == other.separate
+            && self.replaces == other.replaces
     }
 
     /// Whether it is contained in another candidate at its place.

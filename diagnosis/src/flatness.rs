@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::criteria::ParameterCriteria;
+use crate::problem::Problem;
 
 /// A parameter among the unknowns of a fit.
 pub(crate) struct Named<'a> {
@@ -25,6 +26,17 @@ pub(crate) struct Flatness {
     values: DVector<f64>,
     /// Eigenvalue, the square of a singular value, up to which a direction is flat.
     least: f64,
+}
+
+impl Problem<'_> {
+    /// The directions that `JᵀJ` does not determine, and the inverse of the others.
+    pub(crate) fn flat(&self, gram: &DMatrix<f64>) -> (Flatness, DMatrix<f64>) {
+        let norms: Vec<f64> = (0..gram.ncols()).map(|i| gram[(i, i)].sqrt()).collect();
+        let criteria = &self.work.criteria().parameters;
+        let flatness = Flatness::of(gram, &norms, &self.named(), criteria);
+        let inverse = flatness.inverse(&norms);
+        (flatness, inverse)
+    }
 }
 
 impl Flatness {

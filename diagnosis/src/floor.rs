@@ -149,8 +149,8 @@ fn white(runs: &[Vec<f64>], step: f64) -> f64 {
     let least = (1..=ORDERS)
         .flat_map(|order| (1..=SPACINGS).map(move |spacing| (order, spacing)))
         .filter_map(|(order, spacing)| {
-            let sizes: Vec<Vec<f64>> = runs.iter().map(|r| sizes(r, order, spacing)).collect();
-            let blocks = || sizes.iter().flat_map(|run| run.chunks(block(run.len())));
+            let of_runs: Vec<Vec<f64>> = runs.iter().map(|r| sizes(r, order, spacing)).collect();
+            let blocks = || of_runs.iter().flat_map(|run| run.chunks(block(run.len())));
             let variance = |block: &[f64]| {
                 let spread = grouped_median(block.to_vec(), step) / 0.6745;
                 (spread * spread - step * step / 12.0).max(0.0) / gain(order)
@@ -230,6 +230,7 @@ mod tests {
     use loopsight_model::run::Rows;
 
     use super::*;
+    use crate::chance::normal;
 
     fn of(measured: Vec<f64>) -> f64 {
         let time = (0..measured.len()).map(|k| 0.02 * k as f64).collect();
@@ -239,18 +240,7 @@ mod tests {
 
     #[test]
     fn noise_is_found_whatever_its_colour() {
-        let mut state = 5u64;
-        let mut white = || {
-            let mut sum = 0.0;
-            for _ in 0..12 {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1);
-                sum += (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
-            }
-            sum
-        };
-        let q: Vec<f64> = (0..4001).map(|_| white()).collect();
+        let q = normal(4001, 5);
         let motion = |k: usize| 20.0 * (0.04 * k as f64).sin();
         let plain = of((0..4000).map(|k| motion(k) + q[k]).collect());
         assert!((plain - 1.0).abs() < 0.1, "{plain}");
@@ -293,19 +283,10 @@ mod tests {
     /// White in motion, which is two seconds of five, and none at rest.
     #[test]
     fn noise_that_comes_with_motion_counts_as_often_as_it_is_there() {
-        let mut state = 7u64;
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
+        let q = normal(4000, 7);
         let moves = |k: usize| k / 100 % 5 < 2;
         let measured: Vec<f64> = (0..4000)
-            .map(|k| {
-                let q: f64 = (0..12).map(|_| uniform()).sum();
-                f64::from(u8::from(moves(k))) * (10.0 * (0.06 * k as f64).sin() + q)
-            })
+            .map(|k| f64::from(u8::from(moves(k))) * (10.0 * (0.06 * k as f64).sin() + q[k]))
             .collect();
         let (found, truth) = (of(measured), 0.4f64.sqrt());
         assert!((found / truth - 1.0).abs() < 0.15, "{found} {truth}");

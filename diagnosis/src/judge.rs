@@ -91,25 +91,14 @@ pub(crate) fn nrmse(losses: &Losses) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn noise(n: usize, seed: u64) -> Vec<f64> {
-        let mut state = seed;
-        (0..n)
-            .map(|_| {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1);
-                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-            })
-            .collect()
-    }
+    use crate::chance::white;
 
     #[test]
     fn equal_models_are_seldom_told_apart() {
         let mut beyond = 0;
         for seed in 0..200 {
-            let a: Losses = noise(1000, 2 * seed + 1).iter().map(|e| e * e).collect();
-            let b: Losses = noise(1000, 2 * seed + 2).iter().map(|e| e * e).collect();
+            let a: Losses = white(1000, 2 * seed + 1).iter().map(|e| e * e).collect();
+            let b: Losses = white(1000, 2 * seed + 2).iter().map(|e| e * e).collect();
             if advantage(&a, &b, &WindowCriteria::DEFAULT).abs() > 1.96 {
                 beyond += 1;
             }
@@ -119,8 +108,8 @@ mod tests {
 
     #[test]
     fn a_smaller_error_wins() {
-        let a: Losses = noise(1000, 1).iter().map(|e| (1.2 * e).powi(2)).collect();
-        let b: Losses = noise(1000, 2).iter().map(|e| e * e).collect();
+        let a: Losses = white(1000, 1).iter().map(|e| (1.2 * e).powi(2)).collect();
+        let b: Losses = white(1000, 2).iter().map(|e| e * e).collect();
         assert!(advantage(&a, &b, &WindowCriteria::DEFAULT) > 4.0);
         assert!(advantage(&b, &a, &WindowCriteria::DEFAULT) < -4.0);
     }

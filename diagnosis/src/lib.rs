@@ -67,6 +67,8 @@
 mod advice;
 mod arrive;
 mod candidates;
+#[cfg(test)]
+mod chance;
 mod choose;
 mod compare;
 mod conclude;

@@ -9,7 +9,6 @@ use nalgebra::{DMatrix, DVector};
 use crate::arrive::{Arrived, Convergence};
 use crate::error::FitError;
 use crate::fitted::Fit;
-use crate::flatness::Flatness;
 use crate::noise;
 use crate::observer::{attach_observer_for, growth};
 use crate::prediction::InitialStates;
@@ -229,16 +228,11 @@ impl Problem<'_> {
     /// The fit that a solution gives: estimates, intervals, errors.
     pub(crate) fn result(&self, solution: &DVector<f64>) -> Result<Fit, Cancelled> {
         let (residual, mut jacobian) = self.linearise(solution)?;
-        let criteria = &self.work.criteria().parameters;
-        limit_rows(&mut jacobian, criteria.steep);
-        let gram = jacobian.tr_mul(&jacobian);
-        let norms: Vec<f64> = (0..gram.ncols()).map(|i| gram[(i, i)].sqrt()).collect();
-        let flatness = Flatness::of(&gram, &norms, &self.named(), criteria);
+        limit_rows(&mut jacobian, self.work.criteria().parameters.steep);
+        let (flatness, inverse) = self.flat(&jacobian.tr_mul(&jacobian));
         let blocks = self.blocks(&residual, &jacobian);
-        let inverse = flatness.inverse(&norms);
-        let n_signals = self.model.measured.len();
-        let mut covariance =
-            noise::covariance(&blocks, n_signals, &inverse, norms.len(), &self.work)?;
+        let (signals, unknowns) = (self.model.measured.len(), jacobian.ncols());
+        let mut covariance = noise::covariance(&blocks, signals, &inverse, unknowns, &self.work)?;
         for omission in self.omissions(solution)? {
             if let Some(omitted) = self.omitted(&omission, &residual, &jacobian, &inverse)? {
                 omitted.widen(&mut covariance);

@@ -349,16 +349,11 @@ fn by_run(name: &str, runs: &[Run], samples: &Samples, criteria: &FailsCriteria)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chance::uniform;
 
     #[test]
     fn noise_is_not_predicted_and_a_law_is() {
-        let mut state = 1u64;
-        let mut noise = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
+        let mut noise = uniform(1);
         let values: Vec<f64> = (0..3000).map(|k| (0.01 * f64::from(k)).sin()).collect();
         let white: Vec<f64> = values.iter().map(|_| noise()).collect();
         assert!(predicted(&values, &white) < 0.02);

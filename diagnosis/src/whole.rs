@@ -22,7 +22,6 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::error::FitError;
 use crate::fitted::Fit;
-use crate::flatness::Flatness;
 use crate::holdout::Holdout;
 use crate::long::ENOUGH;
 use crate::omitted::{Omitted, SHARPER};
@@ -279,15 +278,6 @@ impl Problem<'_> {
             gram.row_mut(leaves).fill(0.0);
             gram.column_mut(leaves).fill(0.0);
         }
-    }
-
-    /// The directions that the sums do not determine, and the inverse of the others.
-    pub(crate) fn flat(&self, gram: &DMatrix<f64>) -> (Flatness, DMatrix<f64>) {
-        let norms: Vec<f64> = (0..gram.ncols()).map(|i| gram[(i, i)].sqrt()).collect();
-        let criteria = &self.work.criteria().parameters;
-        let flatness = Flatness::of(gram, &norms, &self.named(), criteria);
-        let inverse = flatness.inverse(&norms);
-        (flatness, inverse)
     }
 
     /// Scaled unknowns, each within its range.
