@@ -264,6 +264,14 @@ pub trait Dynamics<S: Real>: Send + Sync {
     }
     /// `h_index(x, u; p)`; zero for slices of other lengths.
     fn output(&self, index: usize, x: &[S], u: &[S], p: &[S]) -> S;
+    /// Those of the outputs that `which` lists, each to its place in `y`.
+    fn outputs(&self, which: &[usize], x: &[S], u: &[S], p: &[S], y: &mut [S]) {
+        for index in which {
+            if let Some(to) = y.get_mut(*index) {
+                *to = self.output(*index, x, u, p);
+            }
+        }
+    }
     /// Parameters of the equations from the values the file gives (set 0 is the equations' own,
     /// set `i` is [`PlantMeta::parameterizations`]`[i - 1]`).
     fn lower(&self, set: usize, from: &[S], p: &mut [S]);

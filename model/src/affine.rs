@@ -200,7 +200,7 @@ impl Affine {
         self.w.fill(0.0);
         if !self.bounds.efforts.is_empty() {
             model.signals_at(p, &self.ahead[..nx], u, signals);
-            let scene = scene(model, values, &self.ahead, signals);
+            let scene = scene(values, &self.ahead, signals);
             for bound in &self.bounds.efforts {
                 if let Place::Effort(i) = bound.place {
                     self.w[i] += scene.contribution(bound, self.w[i], &NoPast);
@@ -211,7 +211,7 @@ impl Affine {
         dynamics.derivative(&self.state[..nx], u, &self.w, p, &mut self.dx);
         if !self.bounds.bodies.is_empty() {
             model.signals_at(p, &self.state[..nx], u, signals);
-            let scene = scene(model, values, &self.state, signals);
+            let scene = scene(values, &self.state, signals);
             for bound in &self.bounds.bodies {
                 if let Place::Rate(i) = bound.place {
                     self.dx[i] += scene.contribution(bound, self.dx[i], &NoPast);
@@ -228,7 +228,7 @@ impl Affine {
         let nx = self.model.n_states();
         let (model, signals) = (&self.model, &mut self.signals);
         model.signals_at(&self.p, &self.state[..nx], command, signals);
-        let scene = scene(model, &self.values, &self.state, signals);
+        let scene = scene(&self.values, &self.state, signals);
         for bound in &self.bounds.inputs {
             if let Place::Input(i) = bound.place {
                 command[i] += scene.contribution(bound, command[i], &NoPast);
@@ -238,14 +238,8 @@ impl Affine {
 }
 
 /// Where effects are evaluated that are the same at any time.
-fn scene<'a>(
-    model: &'a Model,
-    values: &'a [f64],
-    x: &'a [f64],
-    signals: &'a [f64],
-) -> Scene<'a, f64> {
+fn scene<'a>(values: &'a [f64], x: &'a [f64], signals: &'a [f64]) -> Scene<'a, f64> {
     Scene {
-        model,
         values,
         x,
         signals,

@@ -106,7 +106,8 @@ pub mod supervisor;
 mod values;
 
 pub use dual::{
-    DUAL_WIDTH, Dual, DualOf, NARROW_WIDTH, NarrowDual, derivative, variable, variable_of,
+    DUAL_WIDTH, Dual, DualOf, NARROW_WIDTH, NarrowDual, TINY_WIDTH, TinyDual, derivative, variable,
+    variable_of,
 };
 
 #[doc(hidden)]

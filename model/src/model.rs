@@ -10,7 +10,7 @@ mod ties;
 
 use std::path::Path;
 
-use loopsight_core::{Derived, Parameter, Place, PlantMeta};
+use loopsight_core::{Derived, Parameter, Place, PlantMeta, Reading, Role};
 
 use crate::attach::{attach, make_names_unique};
 pub use crate::attach::{fitting_channels, misfit, unit_at};
@@ -352,6 +352,18 @@ impl Model {
         let dynamics = S::dynamics(self.dynamics);
         let of = |(index, meta)| (meta, dynamics.derived(index, &p));
         dynamics.derivable().iter().enumerate().map(of).collect()
+    }
+
+    /// What an effect without states adds at an effort where the flow is `flow` and nothing else is known.
+    ///
+    /// # Panics
+    ///
+    /// When there is no such effect, or there are fewer values than the model has parameters.
+    pub fn effort_at<S: HostReal>(&self, effect: usize, values: &[S], flow: S) -> S {
+        let effect = &self.effects[effect];
+        let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+        let at = Reading::nothing().with(Role::Flow, &flow);
+        S::physics(effect.physics).contribution(&at, &[], &values[own])
     }
 
     /// All signals (states, inputs, outputs) at a state and input, without effects.

@@ -108,7 +108,6 @@ impl<'m> Trial<'m> {
 
     fn scene<'a>(&'a self, x: &'a [f64], signals: &'a [f64], time: f64) -> Scene<'a, f64> {
         Scene {
-            model: self.model,
             values: &self.values,
             x,
             signals,

@@ -17,7 +17,7 @@ use crate::attach::unit_at;
 use crate::config::{Mistake, PathSegment};
 use crate::model::signals;
 use crate::registry::{AnyPhysics, EffectPart, ReadyEffect, Values, effects};
-use crate::{Dual, NarrowDual};
+use crate::{Dual, NarrowDual, TinyDual};
 use loopsight_core::{
     Channel, EffectMeta, Parameter, Physics, PlaceKind, PlantMeta, Reading, Real, Role,
 };
@@ -105,7 +105,7 @@ macro_rules! physics {
         }
     )*};
 }
-physics!(f32, f64, Dual, NarrowDual);
+physics!(f32, f64, Dual, NarrowDual, TinyDual);
 
 impl EffectTable {
     /// The effect of this table at some channels; made once for the same text.

@@ -9,7 +9,7 @@ use super::table::{Ordered, check_used};
 use super::tree::{Slot, Tree};
 use super::{ExpressionError, Names, placed};
 use crate::config::{Mistake, PathSegment};
-use crate::{Dual, NarrowDual};
+use crate::{Dual, NarrowDual, TinyDual};
 use loopsight_core::{Dynamics, Real, rk4_step};
 
 const PARAMETERS: u8 = FIRST_BANK;
@@ -344,7 +344,7 @@ macro_rules! dynamics {
         }
     )*};
 }
-dynamics!(f32, f64, Dual, NarrowDual);
+dynamics!(f32, f64, Dual, NarrowDual, TinyDual);
 
 impl Law {
     /// One step in room for `N` states.

@@ -2,7 +2,7 @@
 
 use super::operation::{Binary, Unary};
 use super::tree::{Slot, Tree};
-use crate::{Dual, NarrowDual};
+use crate::{Dual, NarrowDual, TinyDual};
 use loopsight_core::Real;
 
 /// Bank of the program's own numbers.
@@ -94,6 +94,7 @@ pub(crate) struct Program {
     singles: Vec<f32>,
     duals: Vec<Dual>,
     narrow: Vec<NarrowDual>,
+    tiny: Vec<TinyDual>,
     saved: usize,
 }
 
@@ -107,7 +108,7 @@ macro_rules! numbers {
         }
     )*};
 }
-numbers!(f64: doubles, f32: singles, Dual: duals, NarrowDual: narrow);
+numbers!(f64: doubles, f32: singles, Dual: duals, NarrowDual: narrow, TinyDual: tiny);
 
 impl Program {
     /// A program whose `i`-th result is the `i`-th of `trees`.
@@ -123,10 +124,10 @@ impl Program {
             }
         }
         program.singles = program.doubles.iter().map(|x| *x as f32).collect();
-        program.duals = program.doubles.iter().map(|x| Dual::of(*x)).collect();
-        program.narrow = (program.doubles.iter())
-            .map(|x| NarrowDual::of(*x))
-            .collect();
+        let doubles = program.doubles.iter();
+        program.duals = doubles.clone().map(|x| Dual::of(*x)).collect();
+        program.narrow = doubles.clone().map(|x| NarrowDual::of(*x)).collect();
+        program.tiny = doubles.map(|x| TinyDual::of(*x)).collect();
         program
     }
 

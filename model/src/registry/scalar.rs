@@ -2,7 +2,7 @@
 
 use loopsight_core::{Dynamics, Physics, Real};
 
-use crate::{Dual, NarrowDual};
+use crate::{Dual, NarrowDual, TinyDual};
 
 /// A scalar that composed models are run with on a host.
 pub trait HostReal: Real {
@@ -24,15 +24,20 @@ macro_rules! host_real {
         }
     )*};
 }
-host_real!(f32, f64, Dual, NarrowDual);
+host_real!(f32, f64, Dual, NarrowDual, TinyDual);
 
-/// A plant for every scalar a host uses.
-pub trait AnyDynamics:
-    Dynamics<f32> + Dynamics<f64> + Dynamics<Dual> + Dynamics<NarrowDual>
-{
+macro_rules! for_every_scalar {
+    ($(#[doc = $doc:literal])+ $name:ident of $part:ident: $first:ty $(, $scalar:ty)*) => {
+        $(#[doc = $doc])+
+        pub trait $name: $part<$first> $(+ $part<$scalar>)* {}
+        impl<T: $part<$first> $(+ $part<$scalar>)*> $name for T {}
+    };
 }
-impl<T: Dynamics<f32> + Dynamics<f64> + Dynamics<Dual> + Dynamics<NarrowDual>> AnyDynamics for T {}
-
-/// An effect for every scalar a host uses.
-pub trait AnyPhysics: Physics<f32> + Physics<f64> + Physics<Dual> + Physics<NarrowDual> {}
-impl<T: Physics<f32> + Physics<f64> + Physics<Dual> + Physics<NarrowDual>> AnyPhysics for T {}
+for_every_scalar!(
+    /// A plant for every scalar a host uses.
+    AnyDynamics of Dynamics: f32, f64, Dual, NarrowDual, TinyDual
+);
+for_every_scalar!(
+    /// An effect for every scalar a host uses.
+    AnyPhysics of Physics: f32, f64, Dual, NarrowDual, TinyDual
+);

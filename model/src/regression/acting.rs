@@ -104,10 +104,10 @@ impl Acting {
             input[at] += match self.late[i].history {
                 Some(history) => {
                     self.histories[history].hold(from, nominal);
-                    let scene = self.scene(model, from, (from, to));
+                    let scene = self.scene(from, (from, to));
                     scene.contribution(&self.late[i], nominal, &self.histories[history])
                 }
-                None => self.settle(model, i, nominal, span),
+                None => self.settle(i, nominal, span),
             };
         }
         self.time = to;
@@ -116,18 +116,14 @@ impl Acting {
 
     /// Mean of what the `i`-th late effect adds to its constant input in a period, with its states
     /// integrated by the midpoint rule.
-    fn settle(&mut self, model: &Model, i: usize, nominal: f64, span: f64) -> f64 {
+    fn settle(&mut self, i: usize, nominal: f64, span: f64) -> f64 {
         let z = self.late[i].z..self.late[i].z + self.late[i].n_z;
         let (at, h) = ((self.time, self.time), span / STEPS as f64);
         if !self.begun {
             let mut start = [0.0; 8];
             let n = z.len().min(start.len());
-            self.scene(model, self.time, at).initial(
-                &self.late[i],
-                nominal,
-                &NoPast,
-                &mut start[..n],
-            );
+            self.scene(self.time, at)
+                .initial(&self.late[i], nominal, &NoPast, &mut start[..n]);
             self.x[z.clone()][..n].copy_from_slice(&start[..n]);
         }
         let mut sum = 0.0;
@@ -138,15 +134,15 @@ impl Acting {
             }
             for share in [0.5, 1.0] {
                 let mut rates = std::mem::take(&mut self.rates);
-                self.scene(model, self.time, at)
+                self.scene(self.time, at)
                     .rates(&self.late[i], nominal, &NoPast, &mut rates);
                 self.rates = rates;
                 for (k, from) in z.clone().zip(before) {
                     self.x[k] = from + share * h * self.rates[k];
                 }
-                Scene::confine(model, &self.values, &self.late[i], &mut self.x);
+                Scene::confine(&self.values, &self.late[i], &mut self.x);
                 if share < 1.0 {
-                    let scene = self.scene(model, self.time, at);
+                    let scene = self.scene(self.time, at);
                     sum += scene.contribution(&self.late[i], nominal, &NoPast);
                 }
             }
@@ -178,7 +174,7 @@ impl Acting {
         model.signals_at(p, x, &u, &mut self.signals);
         for bound in &self.inputs {
             if let Place::Input(i) = bound.place {
-                u[i] += self.added(model, bound, u[i]);
+                u[i] += self.added(bound, u[i]);
             }
         }
         if !self.inputs.is_empty() {
@@ -187,28 +183,27 @@ impl Acting {
         w.fill(0.0);
         for bound in &self.efforts {
             if let Place::Effort(i) = bound.place {
-                w[i] += self.added(model, bound, w[i]);
+                w[i] += self.added(bound, w[i]);
             }
         }
         dynamics.derivative(x, &u, w, p, dx);
         for bound in &self.bodies {
             if let Place::Rate(i) = bound.place {
-                dx[i] += self.added(model, bound, dx[i]);
+                dx[i] += self.added(bound, dx[i]);
             }
         }
         w.fill(0.0);
         self.u = u;
     }
 
-    fn added(&self, model: &Model, bound: &Bound, nominal: f64) -> f64 {
+    fn added(&self, bound: &Bound, nominal: f64) -> f64 {
         let at = (self.time, self.time);
-        self.scene(model, self.time, at)
+        self.scene(self.time, at)
             .contribution(bound, nominal, &NoPast)
     }
 
-    fn scene<'a>(&'a self, model: &'a Model, time: f64, interval: (f64, f64)) -> Scene<'a, f64> {
+    fn scene(&self, time: f64, interval: (f64, f64)) -> Scene<'_, f64> {
         Scene {
-            model,
             values: &self.values,
             x: &self.x,
             signals: &self.signals,

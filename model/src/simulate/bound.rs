@@ -1,18 +1,24 @@
 //! Effects at their channels, ready to be evaluated.
 
-use crate::model::{Attached, Model};
-use crate::registry::HostReal;
+use std::ops::Range;
+
+use crate::model::Model;
+use crate::registry::{AnyPhysics, HostReal};
 use loopsight_core::{Channel, Past, Place, Reading, Role};
 
 /// An effect at one channel.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct Bound {
     /// Index of the effect in the model.
     pub(crate) effect: usize,
+    physics: &'static dyn AnyPhysics,
+    /// Its parameters among those of the model.
+    parameters: Range<usize>,
     pub(crate) place: Place,
     side: f64,
     is_position: bool,
-    reads: [Option<usize>; Role::COUNT],
+    /// The roles that its channel binds, and the signals that play them.
+    reads: Vec<(Role, usize)>,
     /// Signals it reads beside those.
     signals: Vec<usize>,
     /// First of its states in the extended state vector.
@@ -32,8 +38,8 @@ impl Bound {
             Place::Output(i) => Some(i),
             _ => None,
         };
-        let named = self.reads.iter().flatten().chain(&self.signals);
-        named.copied().chain(own)
+        let named = self.reads.iter().map(|(_, signal)| *signal);
+        named.chain(self.signals.iter().copied()).chain(own)
     }
 
     /// Whether the effect knows its input already, where so many samples of a run are `foreseen`.
@@ -44,7 +50,7 @@ impl Bound {
 
 /// All effects of a model by the kind of place they act at, in the model's order. On inputs the laws of an
 /// actuator's output come last.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Bounds {
     /// With memory, on inputs.
     pub(crate) input_memory: Vec<Bound>,
@@ -64,20 +70,25 @@ impl Bounds {
     /// Binds the effects of `model`; their states follow the plant's.
     pub(crate) fn of(model: &Model) -> Self {
         let mut bounds = Self::default();
-        let first = model.n_states();
+        let plant_states = model.n_states();
         for (index, effect) in model.effects.iter().enumerate() {
             for (channel, reads) in effect.at.iter().zip(&effect.reads) {
                 let history = effect.meta.memory.then_some(bounds.histories);
                 bounds.histories += usize::from(effect.meta.memory);
+                let first = effect.first_parameter;
                 let bound = Bound {
                     effect: index,
+                    physics: effect.physics,
+                    parameters: first..first + effect.meta.parameters.len(),
                     place: channel.place,
                     side: f64::from(channel.side),
                     is_position: matches!(channel.place, Place::Output(i)
                         if reads_position(model, channel) == Some(i)),
-                    reads: *reads,
+                    reads: (Role::ALL.into_iter())
+                        .filter_map(|role| Some((role, reads[role as usize]?)))
+                        .collect(),
                     signals: effect.signals.clone(),
-                    z: first + bounds.states,
+                    z: plant_states + bounds.states,
                     n_z: effect.meta.states,
                     history,
                     ahead: effect.meta.ahead_s,
@@ -142,7 +153,6 @@ fn reads_position(model: &Model, channel: &Channel) -> Option<usize> {
 /// What an effect is evaluated with.
 #[derive(Clone, Copy)]
 pub(crate) struct Scene<'a, S> {
-    pub(crate) model: &'a Model,
     /// Parameter values of the whole model.
     pub(crate) values: &'a [S],
     /// Extended state.
@@ -154,11 +164,11 @@ pub(crate) struct Scene<'a, S> {
 }
 
 impl<S: HostReal> Scene<'_, S> {
-    fn effect(&self, bound: &Bound) -> &Attached {
-        &self.model.effects[bound.effect]
-    }
-
     fn reading<'p>(&'p self, bound: &Bound, nominal: S, past: &'p dyn Past<S>) -> Reading<'p, S> {
+        let mut roles = [None; Role::COUNT];
+        for (role, signal) in &bound.reads {
+            roles[*role as usize] = self.signals.get(*signal);
+        }
         Reading {
             time: self.time,
             from: self.interval.0,
@@ -166,21 +176,19 @@ impl<S: HostReal> Scene<'_, S> {
             nominal,
             side: S::of(bound.side),
             is_position: bound.is_position,
-            roles: bound.reads.map(|read| self.signals.get(read?)),
+            roles,
             signals: self.signals,
             past,
         }
     }
 
     fn parameters(&self, bound: &Bound) -> &[S] {
-        let effect = self.effect(bound);
-        let first = effect.first_parameter;
-        &self.values[first..first + effect.meta.parameters.len()]
+        &self.values[bound.parameters.clone()]
     }
 
     /// What the effect adds to its channel.
     pub(crate) fn contribution(&self, bound: &Bound, nominal: S, past: &dyn Past<S>) -> S {
-        S::physics(self.effect(bound).physics).contribution(
+        S::physics(bound.physics).contribution(
             &self.reading(bound, nominal, past),
             &self.x[bound.z..bound.z + bound.n_z],
             self.parameters(bound),
@@ -190,7 +198,7 @@ impl<S: HostReal> Scene<'_, S> {
     /// The rates of its states.
     pub(crate) fn rates(&self, bound: &Bound, nominal: S, past: &dyn Past<S>, dx: &mut [S]) {
         if bound.n_z > 0 {
-            S::physics(self.effect(bound).physics).state_derivative(
+            S::physics(bound.physics).state_derivative(
                 &self.reading(bound, nominal, past),
                 &self.x[bound.z..bound.z + bound.n_z],
                 self.parameters(bound),
@@ -201,7 +209,7 @@ impl<S: HostReal> Scene<'_, S> {
 
     /// Its states at the start of a run, into `z`.
     pub(crate) fn initial(&self, bound: &Bound, nominal: S, past: &dyn Past<S>, z: &mut [S]) {
-        S::physics(self.effect(bound).physics).initial_state(
+        S::physics(bound.physics).initial_state(
             &self.reading(bound, nominal, past),
             self.parameters(bound),
             z,
@@ -209,13 +217,11 @@ impl<S: HostReal> Scene<'_, S> {
     }
 
     /// Brings its states within their limits.
-    pub(crate) fn confine(model: &Model, values: &[S], bound: &Bound, x: &mut [S]) {
+    pub(crate) fn confine(values: &[S], bound: &Bound, x: &mut [S]) {
         if bound.n_z > 0 {
-            let effect = &model.effects[bound.effect];
-            let first = effect.first_parameter;
-            S::physics(effect.physics).confine(
+            S::physics(bound.physics).confine(
                 &mut x[bound.z..bound.z + bound.n_z],
-                &values[first..first + effect.meta.parameters.len()],
+                &values[bound.parameters.clone()],
             );
         }
     }

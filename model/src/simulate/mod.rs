@@ -247,14 +247,17 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             signals[nx + i] = held[*i];
         }
         let dynamics = S::dynamics(self.model.dynamics);
-        for i in &self.shown.outputs {
-            signals[nx + nu + i] = dynamics.output(*i, x, held, &self.p);
-        }
+        dynamics.outputs(
+            &self.shown.outputs,
+            x,
+            held,
+            &self.p,
+            &mut signals[nx + nu..],
+        );
     }
 
     fn scene(&self) -> Scene<'_, S> {
         Scene {
-            model: &self.model,
             values: &self.values,
             x: &self.x,
             signals: &self.scratch.signals,

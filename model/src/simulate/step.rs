@@ -49,7 +49,6 @@ impl<S: HostReal> Simulator<'_, S> {
                 continue;
             };
             let scene = Scene {
-                model,
                 values,
                 x,
                 signals: &scratch.signals,
@@ -102,13 +101,12 @@ impl<S: HostReal> Simulator<'_, S> {
                 for i in &needed.inputs {
                     signals[nx + i] = u[*i];
                 }
-                for i in &needed.outputs {
-                    signals[nx + nu + i] = dynamics.output(*i, plant_x, u, p);
+                if !needed.outputs.is_empty() {
+                    dynamics.outputs(&needed.outputs, plant_x, u, p, &mut signals[nx + nu..]);
                 }
             };
             refresh(u, signals);
             let now = Scene {
-                model,
                 values,
                 x,
                 signals: &[],
@@ -182,7 +180,7 @@ impl<S: HostReal> Simulator<'_, S> {
         }
         if bounds.states > 0 {
             for bound in bounds.all() {
-                Scene::confine(model, values, bound, x);
+                Scene::confine(values, bound, x);
             }
         }
         if ramping {

@@ -6,7 +6,8 @@ use loopsight_model::model::Model;
 use loopsight_model::simulate::Simulator;
 use loopsight_model::{Dual, variable};
 
-use super::{PAPER, STEPS, in_turns};
+use super::robot::STEPS;
+use super::{PAPER, in_turns};
 
 const FRICTION: &str = "
 [[effect]]

@@ -14,15 +14,14 @@
 )]
 
 mod expressions;
+mod robot;
 
 use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::Criterion;
-use loopsight_core::{Estimator, Plant, Real};
+use loopsight_core::{Estimator, Plant};
 use loopsight_estimators::{Rls, RlsSettings};
-use loopsight_model::model::Model;
-use loopsight_model::simulate::Simulator;
 use loopsight_plants::Ddmr;
 use nalgebra::{DVector, SVector};
 
@@ -205,59 +204,6 @@ fn settings() -> RlsSettings {
     }
 }
 
-/// The robot's six equations, by hand.
-#[derive(Clone, Copy)]
-struct Robot {
-    k: [f64; 6],
-}
-
-impl Robot {
-    #[inline]
-    fn rate(
-        &self,
-        x: &[f64; 6],
-        volts: &[f64; 2],
-        sin_cos: impl Fn(f64) -> (f64, f64),
-    ) -> [f64; 6] {
-        let [v, omega, heading, ..] = *x;
-        let (sin, cos) = sin_cos(heading);
-        [
-            self.k[0] * v + self.k[1] * omega * omega + self.k[2] * (volts[0] + volts[1]),
-            self.k[3] * omega + self.k[4] * v * omega + self.k[5] * (volts[0] - volts[1]),
-            omega,
-            v,
-            v * cos,
-            v * sin,
-        ]
-    }
-
-    /// One step of the classical Runge-Kutta method.
-    #[inline]
-    fn step(
-        &self,
-        x: &mut [f64; 6],
-        h: f64,
-        volts: &[f64; 2],
-        sin_cos: impl Fn(f64) -> (f64, f64) + Copy,
-    ) {
-        let along = |x: &[f64; 6], k: &[f64; 6], h: f64| -> [f64; 6] {
-            std::array::from_fn(|i| x[i] + h * k[i])
-        };
-        let k1 = self.rate(x, volts, sin_cos);
-        let k2 = self.rate(&along(x, &k1, 0.5 * h), volts, sin_cos);
-        let k3 = self.rate(&along(x, &k2, 0.5 * h), volts, sin_cos);
-        let k4 = self.rate(&along(x, &k3, h), volts, sin_cos);
-        for i in 0..6 {
-            x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
-        }
-    }
-}
-
-/// The functions the composed model uses, which give the same digits on every machine.
-fn portable(angle: f64) -> (f64, f64) {
-    (Real::sin(angle), Real::cos(angle))
-}
-
 /// Nanoseconds per call of each of `sides`, in turns; medians of many rounds, and the median over
 /// the rounds of the ratio of each to the last.
 fn in_turns(calls: usize, sides: &mut [(&str, &mut dyn FnMut(usize))]) {
@@ -360,87 +306,12 @@ fn estimator(criterion: &mut Criterion, ratios: bool) {
     group.finish();
 }
 
-/// Steps of 2.5 ms in an interval of 10 ms, as a loop at 100 Hz has them.
-const STEPS: usize = 4;
-
-fn plant(criterion: &mut Criterion, ratios: bool) {
-    let (model, _) = Model::from_toml("model.toml", PAPER).expect("the model is right");
-    let mut simulator = Simulator::<f64>::new(&model, &model.values());
-    let robot = black_box(Robot {
-        k: [-15.146, 0.005, 0.136, -9.573, -3.945, 0.656],
-    });
-    let volts = |k: usize| {
-        if (k / 50).is_multiple_of(2) {
-            [9.0, -5.0]
-        } else {
-            [-9.0, 5.0]
-        }
-    };
-    let composed = |simulator: &mut Simulator<'_, f64>, calls: usize| {
-        simulator.reset(&[0.0; 6], &[0.0; 2]);
-        for k in 0..calls / STEPS {
-            simulator.advance(black_box((k + 1) as f64 * 0.01), black_box(&volts(k)));
-        }
-        black_box(simulator.state());
-    };
-    let by_hand = |calls: usize, sin_cos: fn(f64) -> (f64, f64)| -> [f64; 6] {
-        let mut x = [0.0; 6];
-        for k in 0..calls / STEPS {
-            let volts = black_box(volts(k));
-            for _ in 0..STEPS {
-                robot.step(&mut x, black_box(0.0025), &volts, sin_cos);
-            }
-        }
-        black_box(x)
-    };
-    // The same equations: the same robot.
-    composed(&mut simulator, 1024);
-    for (a, b) in simulator.state().iter().zip(by_hand(1024, portable)) {
-        assert!((a - b).abs() < 1e-9, "{a} {b}");
-    }
-    if ratios {
-        println!("one RK4 step of the robot, six states (ratio to the last line)");
-        in_turns(
-            4_096,
-            &mut [
-                ("by hand, with the platform's sin and cos", &mut |calls| {
-                    by_hand(calls, f64::sin_cos);
-                }),
-                ("composed from TOML  (target: 1.5)", &mut |calls| {
-                    composed(&mut simulator, calls);
-                }),
-                ("by hand", &mut |calls| {
-                    by_hand(calls, portable);
-                }),
-            ],
-        );
-    }
-    let mut group = criterion.benchmark_group("rk4_step_x4");
-    let mut time = 0.0;
-    simulator.reset(&[0.1, 0.5, 0.3, 0.0, 0.0, 0.0], &[0.0; 2]);
-    group.bench_function("composed", |b| {
-        b.iter(|| {
-            time += 0.01;
-            simulator.advance(black_box(time), black_box(&[3.0, 4.0]));
-        });
-    });
-    let mut x = [0.1, 0.5, 0.3, 0.0, 0.0, 0.0];
-    group.bench_function("by_hand", |b| {
-        b.iter(|| {
-            for _ in 0..STEPS {
-                robot.step(&mut x, black_box(0.0025), black_box(&[3.0, 4.0]), portable);
-            }
-        });
-    });
-    group.finish();
-}
-
 fn main() {
     // `cargo test --benches` only wants to know that it runs.
     let ratios = std::env::args().any(|a| a == "--bench");
     let mut criterion = Criterion::default().configure_from_args();
     estimator(&mut criterion, ratios);
-    plant(&mut criterion, ratios);
+    robot::plant(&mut criterion, ratios);
     expressions::expressions(ratios);
     criterion.final_summary();
 }
