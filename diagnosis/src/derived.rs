@@ -9,10 +9,11 @@ use nalgebra::DMatrix;
 
 use crate::estimate::{Estimate, ParameterVerdict};
 
-/// What a fit knows of its estimated parameters.
-pub(crate) struct Known<'a> {
+/// What a fit knows of its estimated parameters together.
+#[derive(Clone, Debug)]
+pub struct Known {
     /// Their indices.
-    pub(crate) free: &'a [usize],
+    pub(crate) free: Vec<usize>,
     /// Their covariance, in the parameters' units; rows and columns as in `free`.
     pub(crate) covariance: DMatrix<f64>,
     /// Those that the data do not determine: what depends on them has no interval.
@@ -27,10 +28,10 @@ pub(crate) struct Known<'a> {
 ///
 /// The standard error is `√(gᵀ C g)` with the exact gradient `g` by the estimated parameters and their
 /// covariance `C`: linear propagation. Without `known` there is none.
-pub(crate) fn derived(model: &Model, known: Option<&Known<'_>>) -> BTreeMap<String, Estimate> {
+pub(crate) fn derived(model: &Model, known: Option<&Known>) -> BTreeMap<String, Estimate> {
     let values = model.values();
     let mut gradients: Vec<Vec<f64>> = Vec::new();
-    let free = known.map_or(&[][..], |k| k.free);
+    let free = known.map_or(&[][..], |k| &k.free);
     for first in (0..free.len()).step_by(DUAL_WIDTH) {
         let seeded: Vec<Dual> = values
             .iter()
@@ -62,7 +63,13 @@ pub(crate) fn derived(model: &Model, known: Option<&Known<'_>>) -> BTreeMap<Stri
         .collect()
 }
 
-fn estimate(unit: &str, value: f64, gradient: &[f64], known: Option<&Known<'_>>) -> Estimate {
+/// A quantity with its `gradient` by the estimated parameters.
+pub(crate) fn estimate(
+    unit: &str,
+    value: f64,
+    gradient: &[f64],
+    known: Option<&Known>,
+) -> Estimate {
     let mut estimate = Estimate {
         value,
         unit: unit.to_owned(),

@@ -110,7 +110,7 @@ impl Problem<'_> {
         }
         let n = self.free.len();
         let known = Known {
-            free: &self.free,
+            free: self.free.clone(),
             covariance: DMatrix::from_fn(n, n, |i, j| {
                 covariance[(i, j)] * self.scales[i] * self.scales[j]
             }),
@@ -132,6 +132,7 @@ impl Problem<'_> {
             convergence: None,
             flat: flatness.words,
             cancelled: false,
+            known: Some(known),
             model: fitted,
             history: Vec::new(),
         }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::arrive::Convergence;
 use crate::compare::Comparison;
-use crate::derived::derived;
+use crate::derived::{Known, derived};
 use crate::estimate::{Estimate, ParameterVerdict};
 use crate::settings::Method;
 
@@ -40,6 +40,9 @@ pub struct Fit {
     /// are missing.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub cancelled: bool,
+    /// What the fit knows of its estimated parameters together; none where it has no standard errors.
+    #[serde(skip)]
+    pub known: Option<Known>,
     /// The fitted model.
     #[serde(skip)]
     pub model: Model,
@@ -77,6 +80,7 @@ impl Fit {
             convergence: None,
             flat: Vec::new(),
             cancelled: true,
+            known: None,
             model,
             history: Vec::new(),
         }

@@ -23,7 +23,7 @@ use nalgebra::DMatrix;
 /// This is an observer that corrects only the positions. For the idea: H. D. I. Abarbanel, D. R. Creveling,
 /// R. Farsian, M. Kostuk, 2009, "Dynamical state and parameter estimation", SIAM J. Applied Dynamical Systems 8,
 /// 1341–1381.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Positions {
     /// Corrections by state: its index, and one factor per measured signal.
     direct: Vec<(usize, Vec<f64>)>,

@@ -7,7 +7,7 @@ use loopsight_model::model::{Model, pseudo_inverse};
 use loopsight_model::registry::HostReal;
 use loopsight_model::run::Run;
 use loopsight_model::simulate::{Simulator, try_follow};
-use loopsight_model::{DUAL_WIDTH, DualOf, NARROW_WIDTH, derivative, variable_of};
+use loopsight_model::{DUAL_WIDTH, DualOf, NARROW_WIDTH, TINY_WIDTH, derivative, variable_of};
 use nalgebra::{DMatrix, DVector};
 
 use crate::long::ENOUGH;
@@ -66,7 +66,8 @@ pub(crate) struct By<'a> {
 }
 
 /// Simulates `run` from `x0`, differentiated by the parameters and initial states that are listed
-/// (forward mode, [`NARROW_WIDTH`] or [`DUAL_WIDTH`] at a time: two narrow passes cost less than a wide and a narrow one).
+/// (forward mode, [`TINY_WIDTH`], [`NARROW_WIDTH`] or [`DUAL_WIDTH`] at a time: two narrow passes cost less than a wide
+/// and a narrow one).
 pub(crate) fn sensitivities(
     model: &Model,
     values: &[f64],
@@ -106,7 +107,10 @@ pub(crate) fn sensitivities_with(
     let mut first = 0;
     loop {
         let left = columns - first;
-        if left <= NARROW_WIDTH || (DUAL_WIDTH + 1..=2 * NARROW_WIDTH).contains(&left) {
+        if left <= TINY_WIDTH {
+            pass.run::<TINY_WIDTH>(first, &mut found)?;
+            first += TINY_WIDTH;
+        } else if left <= NARROW_WIDTH || (DUAL_WIDTH + 1..=2 * NARROW_WIDTH).contains(&left) {
             pass.run::<NARROW_WIDTH>(first, &mut found)?;
             first += NARROW_WIDTH;
         } else {

@@ -136,6 +136,7 @@ pub(crate) fn fit(
         convergence: None,
         flat: Vec::new(),
         cancelled: done.is_err(),
+        known: None,
         model: fitted,
         history,
     })

@@ -11,8 +11,10 @@ use crate::criteria::{Criteria, SearchCriteria};
 use crate::explain::explain;
 use crate::judge::nrmse;
 use crate::progress::{Stage, Work};
+use crate::promise::Promises;
+use crate::stamps;
 use crate::starts::{Extent, first_starts, fresh_starts, starts_from};
-use crate::trial::{Judged, Nominal, finish, look, promise};
+use crate::trial::{Judged, Nominal, finish, look};
 
 /// A candidate by its index, and where to start it from.
 type Attempt = (usize, Vec<f64>);
@@ -78,12 +80,13 @@ impl Search<'_> {
     }
 
     /// The full fit of a candidate. An effect whose fitted size is nothing explains nothing, whatever the other
-    /// parameters gained.
+    /// parameters gained; nor does a shift in time that the stamps may have of their own.
     fn finished(&self, first: Judged) -> Option<(Judged, Explanation)> {
         let (judged, fit) = finish(first, self.nominal)?;
         let explanation = explain(&judged, &fit, self.nominal).ok()?;
         let least = self.criteria().does_nothing;
-        does_something(&explanation, least).then_some((judged, explanation))
+        let shift = stamps::shift(self.nominal.holdout.runs);
+        does_something(&explanation, least, shift).then_some((judged, explanation))
     }
 
     /// Special cases of the best of `finalists` that ended behind it, fitted anew from where it ended: what it found,
@@ -164,11 +167,12 @@ impl Search<'_> {
     fn promising(&self, attempts: Vec<Attempt>) -> Vec<Attempt> {
         let (done, of) = (AtomicU64::new(0), attempts.len() as u64);
         self.work.tell(Stage::Promises, 0, of);
+        let promises = Promises::new(self.nominal);
         let mut promising: Vec<(f64, Attempt)> = attempts
             .into_par_iter()
             .filter_map(|(i, start)| {
                 let candidate = self.all[i].chosen(&start);
-                let promise = promise(&candidate, &start, self.nominal);
+                let promise = promises.of(&candidate, &start);
                 self.tell(Stage::Promises, &done, of);
                 Some((promise?, (i, start)))
             })
@@ -269,8 +273,8 @@ impl Search<'_> {
 }
 
 /// Whether an effect has any size: a parameter whose neutral value is zero is above the share `least` of its
-/// noticeable size. Where it has none, any parameter must be as far from its neutral value.
-fn does_something(explanation: &Explanation, least: f64) -> bool {
+/// noticeable size, a time above `shift` (s). Where it has none, any parameter must be as far from its neutral value.
+fn does_something(explanation: &Explanation, least: f64, shift: f64) -> bool {
     let model = &explanation.model;
     let place = &explanation.place;
     let own = model.effects.iter().filter(|effect| {
@@ -292,7 +296,9 @@ fn does_something(explanation: &Explanation, least: f64) -> bool {
         .filter(|p| !has_size || p.declaration.default == Some(0.0))
         .any(|p| {
             let away = p.value.zip(p.declaration.default);
-            away.is_none_or(|(value, neutral)| (value - neutral).abs() > least * p.scale())
+            let shift = if p.unit == "s" { shift } else { 0.0 };
+            let enough = shift.max(least * p.scale());
+            away.is_none_or(|(value, neutral)| (value - neutral).abs() > enough)
         })
 }
 

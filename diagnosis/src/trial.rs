@@ -1,4 +1,4 @@
-//! One candidate at a time: the error it promises, a short fit (the look), the full fit.
+//! One candidate at a time: a short fit (the look), the full fit.
 
 use loopsight_model::model::Model;
 use nalgebra::DVector;
@@ -29,10 +29,8 @@ const AGAIN: Effort = Effort {
     iterations: 5,
     tolerance: FINAL.tolerance,
 };
-/// Longest integration steps of a promise and of a look, in steps of the plant. Where the effect reads a position
-/// both take the shorter one, because a long step could skip a cog.
-const PROMISE_STEPS: f64 = 4.0;
-const LOOK_STEPS: f64 = 2.0;
+/// Longest integration steps of a look, in steps of the plant.
+pub(crate) const LOOK_STEPS: f64 = 2.0;
 
 /// A candidate, fitted and judged.
 #[derive(Clone)]
@@ -71,7 +69,7 @@ impl Judged {
 
 /// The model of a candidate with longer integration steps, and with widely smoothed signs where it begins with a
 /// regression. Steps that the file makes shorter than usual stay, because its lags need them.
-fn coarse(candidate: &Candidate, steps: f64) -> Model {
+pub(crate) fn coarse(candidate: &Candidate, steps: f64) -> Model {
     let mut model = match candidate.shape() {
         Some(_) => candidate.softened(),
         None => candidate.model.clone(),
@@ -101,13 +99,17 @@ pub(crate) struct Nominal<'a> {
 }
 
 impl<'a> Nominal<'a> {
-    fn criteria(&self) -> &'a SearchCriteria {
+    pub(crate) fn criteria(&self) -> &'a SearchCriteria {
         &self.work.criteria().search
     }
 
     /// The problem of fitting `model` to the fitting data. Initial states that are not known are estimated. None
     /// where the work was cancelled.
-    fn problem<'m>(&self, model: &'m Model, known: Option<&[DVector<f64>]>) -> Option<Problem<'m>>
+    pub(crate) fn problem<'m>(
+        &self,
+        model: &'m Model,
+        known: Option<&[DVector<f64>]>,
+    ) -> Option<Problem<'m>>
     where
         'a: 'm,
     {
@@ -117,40 +119,8 @@ impl<'a> Nominal<'a> {
     }
 }
 
-/// The cost that a candidate promises, from one start.
-pub(crate) fn promise(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) -> Option<f64> {
-    nominal.work.go_on().ok()?;
-    let plain = nominal.cost;
-    let steps = if Positions::matter_to(candidate.meta) {
-        LOOK_STEPS
-    } else {
-        PROMISE_STEPS
-    };
-    let mut model = coarse(candidate, steps);
-    // While its linear parameters are neutral, the others have no influence and need no derivatives.
-    let shape = candidate.shape();
-    for index in shape.iter().flatten() {
-        model.parameters[*index].free = false;
-        model.parameters[*index].value = Some(start[*index]);
-    }
-    let states = &nominal.solution.states;
-    let mut problem = nominal.problem(&model, nominal.held)?;
-    problem.positions = positions(candidate, start);
-    let (before, after) = problem.promise(start, states).ok()??;
-    let criteria = nominal.criteria();
-    match shape {
-        // At the measured positions the plain model, too, leaves less than in its free run. Where it leaves
-        // hardly anything, the regression tells nothing.
-        Some(_) => {
-            let promising = after < criteria.promising * before || before < criteria.told * plain;
-            promising.then(|| plain * after / before)
-        }
-        None => Some(after),
-    }
-}
-
 /// Where the candidate reads a position it is first tried at the measured ones.
-fn positions(candidate: &Candidate, start: &[f64]) -> Option<Positions> {
+pub(crate) fn positions(candidate: &Candidate, start: &[f64]) -> Option<Positions> {
     Positions::matter_to(candidate.meta)
         .then(|| Positions::of(&candidate.model, start))
         .flatten()

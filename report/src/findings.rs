@@ -142,6 +142,7 @@ pub(crate) fn fit() -> Fit {
         cancelled: false,
         convergence: None,
         flat: vec![],
+        known: None,
         model: model(1),
         history: vec![],
     }

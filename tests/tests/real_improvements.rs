@@ -24,6 +24,8 @@ struct Improved {
     /// Error on what was fitted to.
     seen: Vec<f64>,
     verdict: String,
+    /// What it says that friction takes, V; none where the log is no SysId log.
+    k_s: Option<f64>,
     /// The best model; none where it refused.
     best: Option<Model>,
 }
@@ -40,8 +42,11 @@ impl Improved {
         *self.unseen.last().unwrap()
     }
 
-    /// Level of the friction, V: the mean over the wheels where each has its own.
+    /// What friction takes, V: kS, or the mean of the levels.
     fn friction(&self) -> f64 {
+        if let Some(k_s) = self.k_s {
+            return k_s;
+        }
         let parameters = &self.best.as_ref().unwrap().parameters;
         let levels = parameters
             .iter()
@@ -111,6 +116,7 @@ fn judged(model: Option<&str>, logs: &[PathBuf], test: Option<&Path>) -> Improve
         unseen: errors("nrmse_test"),
         seen: errors("nrmse_fit"),
         verdict: said["verdict"].as_str().unwrap().to_owned(),
+        k_s: said["feedforward"]["kS"]["value"].as_f64(),
         best: std::fs::read_to_string(&best)
             .ok()
             .map(|text| Model::from_toml("best.toml", &text).unwrap().0),

@@ -1,6 +1,9 @@
 //! What SysId makes of a log: terms of a feedforward and gains of a feedback, in V and the log's own units.
 
-use loopsight_diagnosis::{Estimate, Fit};
+use loopsight_core::{Place, Role};
+use loopsight_diagnosis::{Estimate, Fit, InMotion, Work, in_motion};
+use loopsight_model::model::Attached;
+use loopsight_model::run::Run;
 use loopsight_report::words::feedforward::{self, Term};
 use serde::Serialize;
 
@@ -25,7 +28,9 @@ const ARRIVED: f64 = 1e-12;
 pub struct Feedforward {
     /// The log's unit of length or angle: `Meters`, `Rotations`.
     pub units: String,
-    /// Voltage that friction takes, the mean of both directions; absent where none was found.
+    /// Voltage that friction takes, the mean of both directions. Where it changes with the speed (Stribeck friction, drag),
+    /// kS and the slope in kV are those of the line that comes nearest at the speeds of the log, as a regression finds it.
+    /// Absent where no dry friction was found.
     #[serde(rename = "kS", skip_serializing_if = "Option::is_none")]
     pub k_s: Option<ParameterEstimate>,
     /// Voltage that gravity takes; absent where none was found.
@@ -56,35 +61,22 @@ pub struct Feedback {
 }
 
 impl Feedforward {
-    /// From a fit to a log whose unit `units` is `size` of the model's (m or rad). None where the plant has no
-    /// such terms, or they are no machine's.
-    pub(crate) fn of(fit: &Fit, units: &str, size: f64) -> Option<Self> {
-        let per = |id: &str, unit: &str| {
-            let estimate = fit.derived.get(id)?;
-            Some(scaled(estimate, size, unit))
-        };
-        let k_v = per("kV", &format!("V s/{units}"))?;
-        let k_a = per("kA", &format!("V s^2/{units}"))?;
-        let volts = |effects: &[&str]| {
-            let named = |name: &str| {
-                let effect = name.split(['.', '@']).next();
-                let levels = [".level", ".level_forward", ".level_backward"];
-                effect.is_some_and(|e| effects.contains(&e))
-                    && levels.iter().any(|l| name.ends_with(l))
-            };
-            let found = fit.parameters.iter();
-            let found = found.filter(|(name, p)| named(name) && p.unit == "V");
-            mean(found.map(|(_, p)| ParameterEstimate::from(p)).collect())
-        };
+    /// From a fit to a log whose unit `units` is `size` of the model's (m or rad), and what moves in its `runs`. None
+    /// where the plant has no such terms, or they are no machine's.
+    pub(crate) fn of(fit: &Fit, units: &str, size: f64, runs: &[Run]) -> Option<Self> {
+        let per = |estimate: &Estimate, unit: &str| scaled(estimate, size, unit);
+        let of_speed = format!("V s/{units}");
+        let friction = dry(fit).then(|| friction(fit, runs)).flatten();
+        let steady = fit.derived.get("kV")?;
+        let lines = friction.as_ref();
+        let k_v = lines.and_then(|line| line.with_slope.as_ref());
+        let k_v = per(k_v.unwrap_or(steady), &of_speed);
+        let k_a = per(fit.derived.get("kA")?, &format!("V s^2/{units}"));
         let feedback = Feedback::of(k_v.value, k_a.value)?;
         Some(Self {
             units: units.to_owned(),
-            k_s: volts(&[
-                "coulomb_friction",
-                "stribeck_friction",
-                "directional_friction",
-            ]),
-            k_g: volts(&["constant_force", "gravity_pendulum"]),
+            k_s: friction.map(|line| ParameterEstimate::from(&line.level)),
+            k_g: gravity(fit),
             k_v,
             k_a,
             feedback,
@@ -120,6 +112,45 @@ impl Feedforward {
         } = self.feedback;
         feedforward::summary(&terms, [velocity_kp, position_kp, position_kd])
     }
+}
+
+/// Whether the model has dry friction.
+fn dry(fit: &Fit) -> bool {
+    const DRY: [&str; 3] = [
+        "coulomb_friction",
+        "stribeck_friction",
+        "directional_friction",
+    ];
+    let mut effects = fit.model.effects.iter();
+    effects.any(|effect| DRY.contains(&effect.meta.id))
+}
+
+/// What everything that depends on the speed alone takes of the voltages, as a line over the speed.
+fn friction(fit: &Fit, runs: &[Run]) -> Option<InMotion> {
+    let model = &fit.model;
+    let of_speed = |effect: &Attached| {
+        effect.meta.reads == [Role::Flow]
+            && effect.meta.states == 0
+            && (effect.at.iter()).all(|c| matches!(c.place, Place::Effort(_)) && c.unit == "V")
+    };
+    let effects = (0..model.effects.len()).filter(|i| of_speed(&model.effects[*i]));
+    let effects: Vec<usize> = effects.collect();
+    // A wheel's flow is its own speed, and a drivetrain's kV is for the ground's.
+    let radius = model.parameters.iter().map(|p| p.name.as_str());
+    let radius = radius.into_iter().find(|name| *name == "wheel_radius");
+    in_motion(fit, &effects, ("kV", radius), runs, &Work::quiet()).ok()?
+}
+
+/// What gravity takes of the voltages.
+fn gravity(fit: &Fit) -> Option<ParameterEstimate> {
+    let named = |name: &str| {
+        let effect = name.split(['.', '@']).next();
+        effect.is_some_and(|e| ["constant_force", "gravity_pendulum"].contains(&e))
+            && name.ends_with(".level")
+    };
+    let found = fit.parameters.iter();
+    let found = found.filter(|(name, p)| named(name) && p.unit == "V");
+    mean(found.map(|(_, p)| ParameterEstimate::from(p)).collect())
 }
 
 /// The mean of what each channel has of its own; its error that of channels that err together. None of nothing.

@@ -149,7 +149,7 @@ impl ImproveAnswer {
             parameters: best.map_or_else(Estimates::new, |best| estimates(&best.parameters)),
             derived: best.map_or_else(Estimates::new, |best| estimates(&best.derived)),
             feedforward: (best.zip(about.sysid.as_ref()))
-                .and_then(|(best, (units, size))| Feedforward::of(best, units, *size)),
+                .and_then(|(best, (units, size))| Feedforward::of(best, units, *size, &shown)),
             flat: best.map_or_else(Vec::new, |best| best.flat.clone()),
             signals,
             where_it_fails,

@@ -1,0 +1,250 @@
+//! What a candidate promises: the cost after one full Gauss–Newton step from its start.
+//!
+//! ```text
+//! after = rᵀr - gᵀ (JᵀJ)⁺ g        J = [J₀ W]        g = Jᵀ r
+//! ```
+//!
+//! with `r` the residuals at the start, `W` their derivatives by the parameters that the candidate brings, and `J₀` those
+//! by the parameters of the plain model. Of these `W` is one of a few columns for every start. `J₀` is that of the plain
+//! model at its solution, which all candidates share: a candidate has hardly moved the machine away from there, and
+//! the promise only ranks it. So a promise costs one simulation with one or two derivatives, and not with eight.
+
+use std::sync::OnceLock;
+
+use loopsight_model::model::pseudo_inverse;
+use nalgebra::DMatrix;
+
+use crate::candidates::Candidate;
+use crate::positions::Positions;
+use crate::prediction::Solution;
+use crate::problem::Problem;
+use crate::trial::{LOOK_STEPS, Nominal, coarse, positions};
+
+/// Longest integration steps of a promise, in steps of the plant. Where the effect reads a position they are those of a
+/// look, because a long step could skip a cog.
+const PROMISE_STEPS: f64 = 4.0;
+
+/// The promises of candidates.
+pub(crate) struct Promises<'a> {
+    nominal: &'a Nominal<'a>,
+    /// The plain model linearised: at simulated positions and at measured ones, with signs as they are and widely
+    /// smoothed. Each is made when the first candidate needs it.
+    plain: [OnceLock<Option<Linear>>; 4],
+}
+
+/// The plain model linearised at its solution.
+struct Linear {
+    positions: Option<Positions>,
+    /// Weights of the first samples, where initial states are estimated.
+    first: Vec<Vec<f64>>,
+    /// `J₀`
+    jacobian: DMatrix<f64>,
+    /// `J₀ᵀJ₀`
+    gram: DMatrix<f64>,
+}
+
+impl<'a> Promises<'a> {
+    pub(crate) fn new(nominal: &'a Nominal<'a>) -> Self {
+        Self {
+            nominal,
+            plain: Default::default(),
+        }
+    }
+
+    /// The cost that a candidate promises, from one start.
+    pub(crate) fn of(&self, candidate: &Candidate, start: &[f64]) -> Option<f64> {
+        let nominal = self.nominal;
+        nominal.work.go_on().ok()?;
+        let plain = nominal.cost;
+        let states = &nominal.solution.states;
+        let mut model = coarse(candidate, steps(candidate));
+        // While its linear parameters are neutral, the others have no influence and need no derivatives.
+        let shape = candidate.shape();
+        let at = positions(candidate, start);
+        let linear = self.linear(candidate, start, at.as_ref());
+        let shared = linear.is_some().then(|| 0..candidate.own().start);
+        let known = shape
+            .iter()
+            .flatten()
+            .copied()
+            .chain(shared.into_iter().flatten());
+        for index in known {
+            let parameter = &mut model.parameters[index];
+            if parameter.free {
+                parameter.free = false;
+                parameter.value = Some(start[index]);
+            }
+        }
+        let known = match linear {
+            Some(_) => Some(&**states),
+            None => nominal.held,
+        };
+        let mut problem = nominal.problem(&model, known)?;
+        problem.positions = at;
+        let (before, after) = match linear {
+            Some(linear) => linear.promise(&mut problem, start)?,
+            None => problem.promise(start, states).ok()??,
+        };
+        let criteria = nominal.criteria();
+        match shape {
+            // At the measured positions the plain model, too, leaves less than in its free run. Where it leaves
+            // hardly anything, the regression tells nothing.
+            Some(_) => {
+                let promising =
+                    after < criteria.promising * before || before < criteria.told * plain;
+                promising.then(|| plain * after / before)
+            }
+            None => Some(after),
+        }
+    }
+
+    /// The plain model linearised as the candidate at this start needs it. None where it starts from elsewhere, or is no
+    /// more than that model with something added.
+    fn linear(
+        &self,
+        candidate: &Candidate,
+        start: &[f64],
+        at: Option<&Positions>,
+    ) -> Option<&Linear> {
+        let given = &self.nominal.model.parameters;
+        let base = candidate.own().start;
+        let same = candidate.replaces.is_none()
+            && base == given.len()
+            && start[..base] == self.nominal.model.values()
+            && (given.iter().zip(&candidate.model.parameters)).all(|(a, b)| a.free == b.free);
+        if !same {
+            return None;
+        }
+        let softened = candidate.shape().is_some();
+        let kind = 2 * usize::from(at.is_some()) + usize::from(softened);
+        let made = self.plain[kind].get_or_init(|| self.made(candidate, at));
+        made.as_ref()
+            .filter(|linear| linear.positions.as_ref() == at)
+    }
+
+    /// Linearises the plain model; none where it diverges with steps of that length.
+    fn made(&self, candidate: &Candidate, at: Option<&Positions>) -> Option<Linear> {
+        let nominal = self.nominal;
+        let last = candidate.model.effects.len().checked_sub(1)?;
+        let model = coarse(candidate, steps(candidate)).without_effect(last)?;
+        let Solution { values, states } = nominal.solution;
+        let mut problem = nominal.problem(&model, nominal.held)?;
+        problem.positions = at.cloned();
+        let (_, jacobian) = problem.linearise(&problem.pack(values, states)).ok()?;
+        let gram = jacobian.tr_mul(&jacobian);
+        gram.iter().all(|v| v.is_finite()).then(|| Linear {
+            positions: at.cloned(),
+            first: problem.first.clone(),
+            jacobian,
+            gram,
+        })
+    }
+}
+
+impl Linear {
+    /// Cost at the start of a candidate, whose own parameters are the unknowns of `problem`, and the one that a full
+    /// Gauss–Newton step of all parameters would reach if the model were linear in them.
+    fn promise(&self, problem: &mut Problem<'_>, start: &[f64]) -> Option<(f64, f64)> {
+        problem.first.clone_from(&self.first);
+        // What is known is no unknown.
+        let (residual, own) = problem.linearise(&problem.pack(start, &[])).ok()?;
+        let (n, m) = (self.gram.ncols(), own.ncols());
+        let mut gram = self.gram.clone().resize(n + m, n + m, 0.0);
+        let across = self.jacobian.tr_mul(&own);
+        gram.view_mut((0, n), (n, m)).copy_from(&across);
+        gram.view_mut((n, 0), (m, n)).copy_from(&across.transpose());
+        gram.view_mut((n, n), (m, m)).copy_from(&own.tr_mul(&own));
+        let mut right = self
+            .jacobian
+            .tr_mul(&residual)
+            .resize_vertically(n + m, 0.0);
+        right.rows_mut(n, m).copy_from(&own.tr_mul(&residual));
+        let before = residual.norm_squared();
+        let after = before - right.dot(&(pseudo_inverse(&gram)? * &right));
+        after.is_finite().then_some((before, after.max(0.0)))
+    }
+}
+
+/// Longest integration steps of a candidate's promise, in steps of the plant.
+fn steps(candidate: &Candidate) -> f64 {
+    if Positions::matter_to(candidate.meta) {
+        LOOK_STEPS
+    } else {
+        PROMISE_STEPS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use loopsight_model::model::Model;
+    use loopsight_model::run::{Rows, Run};
+    use loopsight_model::simulate::{Simulator, free_run};
+    use loopsight_plants as _;
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::progress::Work;
+
+    const AXIS: &str = "[plant.dc_axis]\nK_A = -2.0\nK_C = 8.0\n[log.measured.speed]\n";
+    const FRICTION: &str = "[[effect]]\n[effect.coulomb_friction]\nat = [\"shaft\"]\nwidth = 0.5\n";
+
+    fn axis(text: &str) -> Model {
+        Model::from_toml("axis.toml", &format!("{AXIS}{text}"))
+            .unwrap()
+            .0
+    }
+
+    /// A swing of an axis with dry friction.
+    fn swing() -> Run {
+        let time: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
+        let volts: Vec<f64> = time.iter().map(|t| 6.0 * (3.0 * t).sin()).collect();
+        let mut run = Run::empty(1, 1);
+        for (t, u) in time.iter().zip(&volts) {
+            run.push(*t, &[*u], &[0.0]).unwrap();
+        }
+        let with = axis(&format!("{FRICTION}level = 0.8\n"));
+        let mut speeds = Vec::new();
+        let mut simulator = Simulator::new(&with, &with.values());
+        let x0 = vec![0.0; with.n_states()];
+        free_run(&mut simulator, &x0, &run, |_, y| {
+            speeds.extend_from_slice(y)
+        });
+        Run::new("", time, Rows::new(1, volts), Rows::new(1, speeds)).unwrap()
+    }
+
+    /// Where a candidate starts without influence, the plain model's derivatives are its own: the promise has the digits
+    /// of the one that differentiates by all parameters.
+    #[test]
+    fn a_shared_linearisation_promises_what_one_of_its_own_does() {
+        let runs = [swing()];
+        let (plain, with) = (axis(""), axis(&format!("{FRICTION}level = 0.0\n")));
+        let states = vec![DVector::zeros(plain.n_states())];
+        let problem =
+            |model| Problem::with(model, &runs, None, Some(states.clone()), Work::quiet()).unwrap();
+        let of_plain = problem(&plain);
+        let at = of_plain.pack(&plain.values(), &states);
+        let (_, jacobian) = of_plain.linearise(&at).unwrap();
+        let linear = Linear {
+            positions: None,
+            first: Vec::new(),
+            gram: jacobian.tr_mul(&jacobian),
+            jacobian,
+        };
+        let mut own = with.clone();
+        for parameter in &mut own.parameters[..plain.parameters.len()] {
+            parameter.free = false;
+        }
+        let start = with.values();
+        let shared = linear.promise(&mut problem(&own), &start).unwrap();
+        let whole = problem(&with).promise(&start, &states).unwrap().unwrap();
+        assert!(
+            (shared.0 / whole.0 - 1.0).abs() < 1e-9,
+            "{shared:?} {whole:?}"
+        );
+        assert!(
+            (shared.1 / whole.1 - 1.0).abs() < 1e-6,
+            "{shared:?} {whole:?}"
+        );
+        assert!(shared.1 < 0.1 * shared.0, "{shared:?}");
+    }
+}
