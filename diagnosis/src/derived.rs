@@ -29,38 +29,46 @@ pub struct Known {
 /// The standard error is `√(gᵀ C g)` with the exact gradient `g` by the estimated parameters and their
 /// covariance `C`: linear propagation. Without `known` there is none.
 pub(crate) fn derived(model: &Model, known: Option<&Known>) -> BTreeMap<String, Estimate> {
-    let values = model.values();
-    let mut gradients: Vec<Vec<f64>> = Vec::new();
-    let free = known.map_or(&[][..], |k| &k.free);
-    for first in (0..free.len()).step_by(DUAL_WIDTH) {
-        let seeded: Vec<Dual> = values
-            .iter()
-            .enumerate()
-            .map(|(i, v)| match free.iter().position(|f| *f == i) {
-                Some(k) if (first..first + DUAL_WIDTH).contains(&k) => variable(*v, k - first),
-                _ => Dual::of(*v),
-            })
-            .collect();
-        let pass = model.derived(&seeded);
-        gradients.resize(pass.len(), Vec::new());
-        for (gradient, (_, value)) in gradients.iter_mut().zip(&pass) {
-            let last = (first + DUAL_WIDTH).min(free.len());
-            gradient.extend((0..last - first).map(|k| derivative(value, k)));
-        }
-    }
-    model
-        .derived(&values)
-        .into_iter()
-        .enumerate()
-        .filter(|(_, (_, value))| value.is_finite())
-        .map(|(index, (meta, value))| {
-            let gradient = gradients.get(index).map_or(&[][..], Vec::as_slice);
-            (
-                meta.id.to_owned(),
-                estimate(meta.unit, value, gradient, known),
-            )
+    let of = |seeded: &[Dual]| -> Vec<Dual> {
+        let derived = model.derived(seeded).into_iter();
+        derived.map(|(_, value)| value).collect()
+    };
+    let found = with_gradients(model, known, of).into_iter();
+    let metas = model.derived(&model.values()).into_iter();
+    metas
+        .zip(found)
+        .filter(|(_, (value, _))| value.is_finite())
+        .map(|((meta, _), (value, gradient))| {
+            let estimate = estimate(meta.unit, value, &gradient, known);
+            (meta.id.to_owned(), estimate)
         })
         .collect()
+}
+
+/// Quantities `of` the parameters at the model's values, each with its gradient by the estimated ones.
+pub(crate) fn with_gradients(
+    model: &Model,
+    known: Option<&Known>,
+    of: impl Fn(&[Dual]) -> Vec<Dual>,
+) -> Vec<(f64, Vec<f64>)> {
+    let values = model.values();
+    let free = known.map_or(&[][..], |known| &known.free);
+    let mut found = Vec::new();
+    // At least once, for the values.
+    for first in (0..free.len().max(1)).step_by(DUAL_WIDTH) {
+        let of_pass = &free[first..(first + DUAL_WIDTH).min(free.len())];
+        let mut seeded: Vec<Dual> = values.iter().map(|value| Dual::of(*value)).collect();
+        for (k, index) in of_pass.iter().enumerate() {
+            seeded[*index] = variable(values[*index], k);
+        }
+        let pass = of(&seeded);
+        found.resize_with(pass.len(), || (0.0, Vec::new()));
+        for ((value, gradient), quantity) in found.iter_mut().zip(&pass) {
+            *value = quantity.value();
+            gradient.extend((0..of_pass.len()).map(|k| derivative(quantity, k)));
+        }
+    }
+    found
 }
 
 /// A quantity with its `gradient` by the estimated parameters.

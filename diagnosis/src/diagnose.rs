@@ -25,6 +25,7 @@ use crate::progress::{Cancelled, Stage, Work};
 use crate::residual_force;
 use crate::search::{Found, Search};
 use crate::settings::FitSettings;
+use crate::stamps;
 use crate::sufficiency;
 use crate::trial::{FINAL, Judged, Nominal};
 use crate::untried::untried;
@@ -349,6 +350,7 @@ fn search(
         all: &all,
         nominal,
         work,
+        shift: stamps::shift(nominal.holdout.runs),
     };
     let Found { finalists, looked } = search.run();
     let (finalists, mut explanations): (Vec<Judged>, Vec<_>) = finalists.into_iter().unzip();

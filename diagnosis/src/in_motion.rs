@@ -1,13 +1,13 @@
 //! What a machine takes to move, as a line over its speed: a law of friction in two numbers.
 
 use loopsight_core::{Place, Real, Role};
+use loopsight_model::Dual;
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_model::simulate::{Simulator, try_follow};
-use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 
 use crate::criteria::FailsCriteria;
-use crate::derived::estimate;
+use crate::derived::{estimate, with_gradients};
 use crate::estimate::Estimate;
 use crate::fitted::Fit;
 use crate::motion::rest;
@@ -70,8 +70,7 @@ pub fn in_motion(
     let radius = steady
         .1
         .map(|name| model.parameters.iter().position(|p| p.name == name));
-    let values = model.values();
-    let line = |seeded: &[Dual]| -> [Dual; 2] {
+    let line = |seeded: &[Dual]| -> Vec<Dual> {
         let [mut level, mut slope] = [Dual::of(0.0); 2];
         for at in &flows {
             for (k, flow) in at.flows.iter().enumerate() {
@@ -85,35 +84,19 @@ pub fn in_motion(
             _ => Dual::of(1.0),
         };
         let of_plant = asked.map_or(Dual::of(0.0), |i| model.derived(seeded)[i].1);
-        [level, of_plant + slope / per]
+        vec![level, of_plant + slope / per]
     };
+    let units = [unit, asked.map_or("", |asked| derived[asked].0.unit)];
     let known = fit.known.as_ref();
-    let free = known.map_or(&[][..], |known| &known.free);
-    let mut gradients = [Vec::new(), Vec::new()];
-    let mut found = [0.0; 2];
-    // At least once, for the values.
-    for first in (0..free.len().max(1)).step_by(DUAL_WIDTH) {
-        let of_pass = &free[first..(first + DUAL_WIDTH).min(free.len())];
-        let mut seeded: Vec<Dual> = values.iter().map(|value| Dual::of(*value)).collect();
-        for (k, index) in of_pass.iter().enumerate() {
-            seeded[*index] = variable(values[*index], k);
-        }
-        for (i, line) in line(&seeded).into_iter().enumerate() {
-            found[i] = line.value();
-            gradients[i].extend((0..of_pass.len()).map(|k| derivative(&line, k)));
-        }
-    }
-    let [level, with_slope] = [0, 1].map(|i| {
-        let unit = match i {
-            0 => unit,
-            _ => asked.map_or("", |asked| derived[asked].0.unit),
-        };
-        estimate(unit, found[i], &gradients[i], known)
-    });
+    let mut found = (with_gradients(model, known, line).into_iter().zip(units))
+        .map(|((value, gradient), unit)| estimate(unit, value, &gradient, known));
+    let (Some(level), with_slope) = (found.next(), found.next()) else {
+        return Ok(None);
+    };
     let known_speed = asked.is_some() && radius != Some(None);
     Ok(Some(InMotion {
         level,
-        with_slope: known_speed.then_some(with_slope),
+        with_slope: with_slope.filter(|_| known_speed),
     }))
 }
 
@@ -189,38 +172,21 @@ impl Flow {
 
 #[cfg(test)]
 mod tests {
-    use loopsight_model::run::Rows;
-    use loopsight_model::simulate::free_run;
     use loopsight_plants as _;
 
     use super::*;
     use crate::settings::Method;
+    use crate::swing::swing;
 
     const AXIS: &str = "[plant.dc_axis]\nK_A = -2.0\nK_C = 8.0\n[log.measured.speed]\n";
     const STRIBECK: &str = "[[effect]]\n[effect.stribeck_friction]\nat = [\"shaft\"]\nlevel = 0.2\nextra = 0.5\nspeed = 9.0\nwidth = 0.01\n";
     const DRAG: &str = "[[effect]]\n[effect.coulomb_friction]\nat = [\"shaft\"]\nlevel = 0.5\nwidth = 0.01\n[[effect]]\n[effect.quadratic_drag]\nat = [\"shaft\"]\ncoefficient = 0.002\n";
 
-    /// A swing, and the speeds above rest.
-    fn swing(model: &Model) -> (Run, Vec<f64>) {
-        let time: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
-        let volts: Vec<f64> = time.iter().map(|t| 6.0 * (3.0 * t).sin()).collect();
-        let mut run = Run::empty(1, 1);
-        for (t, u) in time.iter().zip(&volts) {
-            run.push(*t, &[*u], &[0.0]).unwrap();
-        }
-        let mut simulator = Simulator::new(model, &model.values());
-        let x0 = vec![0.0; model.n_states()];
-        let mut speeds = Vec::new();
-        free_run(&mut simulator, &x0, &run, |_, y| {
-            speeds.extend_from_slice(y)
-        });
-        let rows = Rows::new(1, speeds.clone());
-        let least = rest(speeds.iter().copied(), FailsCriteria::DEFAULT.rest);
-        speeds.retain(|speed| speed.abs() > least);
-        (
-            Run::new("", time, Rows::new(1, volts), rows).unwrap(),
-            speeds,
-        )
+    /// The speeds of a run above rest.
+    fn moving(run: &Run) -> Vec<f64> {
+        let speeds = run.measured().iter().copied();
+        let least = rest(speeds.clone(), FailsCriteria::DEFAULT.rest);
+        speeds.filter(|speed| speed.abs() > least).collect()
     }
 
     /// The line through a law over some speeds, by the normal equations.
@@ -246,8 +212,8 @@ mod tests {
         ];
         for (effects, indices, law) in cases {
             let (model, _) = Model::from_toml("axis.toml", &format!("{AXIS}{effects}")).unwrap();
-            let (run, speeds) = swing(&model);
-            let [level, slope] = line(&speeds, law);
+            let run = swing(&model, 1000);
+            let [level, slope] = line(&moving(&run), law);
             let fit = Fit::cancelled(model, Method::OutputError, 0.0, 0);
             let work = Work::quiet();
             let found = in_motion(&fit, indices, ("kV", None), &[run], &work)

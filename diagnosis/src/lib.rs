@@ -126,6 +126,8 @@ mod stamps;
 mod starts;
 mod stride;
 mod sufficiency;
+#[cfg(test)]
+mod swing;
 pub mod tracking;
 mod trial;
 mod unfold;

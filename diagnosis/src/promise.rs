@@ -177,13 +177,12 @@ fn steps(candidate: &Candidate) -> f64 {
 #[cfg(test)]
 mod tests {
     use loopsight_model::model::Model;
-    use loopsight_model::run::{Rows, Run};
-    use loopsight_model::simulate::{Simulator, free_run};
     use loopsight_plants as _;
     use nalgebra::DVector;
 
     use super::*;
     use crate::progress::Work;
+    use crate::swing::swing;
 
     const AXIS: &str = "[plant.dc_axis]\nK_A = -2.0\nK_C = 8.0\n[log.measured.speed]\n";
     const FRICTION: &str = "[[effect]]\n[effect.coulomb_friction]\nat = [\"shaft\"]\nwidth = 0.5\n";
@@ -194,29 +193,11 @@ mod tests {
             .0
     }
 
-    /// A swing of an axis with dry friction.
-    fn swing() -> Run {
-        let time: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
-        let volts: Vec<f64> = time.iter().map(|t| 6.0 * (3.0 * t).sin()).collect();
-        let mut run = Run::empty(1, 1);
-        for (t, u) in time.iter().zip(&volts) {
-            run.push(*t, &[*u], &[0.0]).unwrap();
-        }
-        let with = axis(&format!("{FRICTION}level = 0.8\n"));
-        let mut speeds = Vec::new();
-        let mut simulator = Simulator::new(&with, &with.values());
-        let x0 = vec![0.0; with.n_states()];
-        free_run(&mut simulator, &x0, &run, |_, y| {
-            speeds.extend_from_slice(y)
-        });
-        Run::new("", time, Rows::new(1, volts), Rows::new(1, speeds)).unwrap()
-    }
-
     /// Where a candidate starts without influence, the plain model's derivatives are its own: the promise has the digits
     /// of the one that differentiates by all parameters.
     #[test]
     fn a_shared_linearisation_promises_what_one_of_its_own_does() {
-        let runs = [swing()];
+        let runs = [swing(&axis(&format!("{FRICTION}level = 0.8\n")), 400)];
         let (plain, with) = (axis(""), axis(&format!("{FRICTION}level = 0.0\n")));
         let states = vec![DVector::zeros(plain.n_states())];
         let problem =

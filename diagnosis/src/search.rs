@@ -12,7 +12,6 @@ use crate::explain::explain;
 use crate::judge::nrmse;
 use crate::progress::{Stage, Work};
 use crate::promise::Promises;
-use crate::stamps;
 use crate::starts::{Extent, first_starts, fresh_starts, starts_from};
 use crate::trial::{Judged, Nominal, finish, look};
 
@@ -24,6 +23,8 @@ pub(crate) struct Search<'a> {
     pub(crate) all: &'a [Candidate],
     pub(crate) nominal: &'a Nominal<'a>,
     pub(crate) work: &'a Work<'a>,
+    /// How late time stamps may be of their own, s.
+    pub(crate) shift: f64,
 }
 
 /// What a search found.
@@ -85,8 +86,7 @@ impl Search<'_> {
         let (judged, fit) = finish(first, self.nominal)?;
         let explanation = explain(&judged, &fit, self.nominal).ok()?;
         let least = self.criteria().does_nothing;
-        let shift = stamps::shift(self.nominal.holdout.runs);
-        does_something(&explanation, least, shift).then_some((judged, explanation))
+        does_something(&explanation, least, self.shift).then_some((judged, explanation))
     }
 
     /// Special cases of the best of `finalists` that ended behind it, fitted anew from where it ended: what it found,

@@ -86,59 +86,78 @@ fn portable(angle: f64) -> (f64, f64) {
 /// Steps of 2.5 ms in an interval of 10 ms, as a loop at 100 Hz has them.
 pub(crate) const STEPS: usize = 4;
 
+/// The volts of the inputs in the `k`-th interval.
+fn volts(k: usize) -> [f64; 2] {
+    if (k / 50).is_multiple_of(2) {
+        [9.0, -5.0]
+    } else {
+        [-9.0, 5.0]
+    }
+}
+
+/// `calls` steps of the robot by hand, with what `left` leaves of the volts.
+fn by_hand(
+    robot: &Robot,
+    calls: usize,
+    left: impl Fn(&[f64; 6], [f64; 2]) -> [f64; 2] + Copy,
+    sin_cos: impl Fn(f64) -> (f64, f64) + Copy,
+) -> [f64; 6] {
+    let mut x = [0.0; 6];
+    for k in 0..calls / STEPS {
+        let volts = black_box(volts(k));
+        for _ in 0..STEPS {
+            robot.step(&mut x, black_box(0.0025), |x| left(x, volts), sin_cos);
+        }
+    }
+    black_box(x)
+}
+
+/// The same steps of a composed model.
+fn composed(simulator: &mut Simulator<'_, f64>, calls: usize) {
+    simulator.reset(&[0.0; 6], &[0.0; 2]);
+    for k in 0..calls / STEPS {
+        simulator.advance(black_box((k + 1) as f64 * 0.01), black_box(&volts(k)));
+    }
+    black_box(simulator.state());
+}
+
+/// The composed robot of a model file. It must be the one `by_hand`.
+fn checked(text: &str, by_hand: impl Fn(usize) -> [f64; 6]) -> Simulator<'static, f64> {
+    let (model, _) = Model::from_toml("model.toml", text).expect("the model is right");
+    let values = model.values();
+    let mut simulator = Simulator::owning(model, &values);
+    composed(&mut simulator, 1024);
+    for (a, b) in simulator.state().iter().zip(by_hand(1024)) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+    simulator
+}
+
 pub(crate) fn plant(criterion: &mut Criterion, ratios: bool) {
-    let (model, _) = Model::from_toml("model.toml", PAPER).expect("the model is right");
-    let mut simulator = Simulator::<f64>::new(&model, &model.values());
     let robot = black_box(Robot {
         k: [-15.146, 0.005, 0.136, -9.573, -3.945, 0.656],
     });
-    let volts = |k: usize| {
-        if (k / 50).is_multiple_of(2) {
-            [9.0, -5.0]
-        } else {
-            [-9.0, 5.0]
-        }
-    };
-    let composed = |simulator: &mut Simulator<'_, f64>, calls: usize| {
-        simulator.reset(&[0.0; 6], &[0.0; 2]);
-        for k in 0..calls / STEPS {
-            simulator.advance(black_box((k + 1) as f64 * 0.01), black_box(&volts(k)));
-        }
-        black_box(simulator.state());
-    };
-    let by_hand = |calls: usize, sin_cos: fn(f64) -> (f64, f64)| -> [f64; 6] {
-        let mut x = [0.0; 6];
-        for k in 0..calls / STEPS {
-            let volts = black_box(volts(k));
-            for _ in 0..STEPS {
-                robot.step(&mut x, black_box(0.0025), |_| volts, sin_cos);
-            }
-        }
-        black_box(x)
-    };
-    // The same equations: the same robot.
-    composed(&mut simulator, 1024);
-    for (a, b) in simulator.state().iter().zip(by_hand(1024, portable)) {
-        assert!((a - b).abs() < 1e-9, "{a} {b}");
-    }
+    let frictionless = |_: &[f64; 6], volts: [f64; 2]| volts;
+    let alone = |calls: usize| by_hand(&robot, calls, frictionless, portable);
+    let mut simulator = checked(PAPER, alone);
     if ratios {
         println!("one RK4 step of the robot, six states (ratio to the last line)");
         in_turns(
             4_096,
             &mut [
                 ("by hand, with the platform's sin and cos", &mut |calls| {
-                    by_hand(calls, f64::sin_cos);
+                    by_hand(&robot, calls, frictionless, f64::sin_cos);
                 }),
                 ("composed from TOML  (target: 1.1)", &mut |calls| {
                     composed(&mut simulator, calls);
                 }),
                 ("by hand", &mut |calls| {
-                    by_hand(calls, portable);
+                    alone(calls);
                 }),
             ],
         );
+        with_friction(&robot);
     }
-    with_friction(robot, volts, ratios);
     let mut group = criterion.benchmark_group("rk4_step_x4");
     let mut time = 0.0;
     simulator.reset(&[0.1, 0.5, 0.3, 0.0, 0.0, 0.0], &[0.0; 2]);
@@ -161,51 +180,27 @@ pub(crate) fn plant(criterion: &mut Criterion, ratios: bool) {
 }
 
 /// The same with dry friction at both wheels.
-fn with_friction(robot: Robot, volts: impl Fn(usize) -> [f64; 2] + Copy, ratios: bool) {
+fn with_friction(robot: &Robot) {
     const FRICTION: &str = "\n[[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel = 0.8\nwidth = 0.1\n";
-    let text = format!("{PAPER}{FRICTION}");
-    let (model, _) = Model::from_toml("model.toml", &text).expect("the model is right");
-    let mut simulator = Simulator::<f64>::new(&model, &model.values());
     let dry = black_box(Dry {
         level: 0.8,
         width: 0.1,
         half_track: 0.131,
         wheel_radius: 0.05,
     });
-    let composed = |simulator: &mut Simulator<'_, f64>, calls: usize| {
-        simulator.reset(&[0.0; 6], &[0.0; 2]);
-        for k in 0..calls / STEPS {
-            simulator.advance(black_box((k + 1) as f64 * 0.01), black_box(&volts(k)));
-        }
-        black_box(simulator.state());
-    };
-    let by_hand = |calls: usize| -> [f64; 6] {
-        let mut x = [0.0; 6];
-        for k in 0..calls / STEPS {
-            let volts = black_box(volts(k));
-            for _ in 0..STEPS {
-                let left = |x: &[f64; 6]| dry.volts(x, volts);
-                robot.step(&mut x, black_box(0.0025), left, portable);
-            }
-        }
-        black_box(x)
-    };
-    composed(&mut simulator, 1024);
-    for (a, b) in simulator.state().iter().zip(by_hand(1024)) {
-        assert!((a - b).abs() < 1e-9, "{a} {b}");
-    }
-    if ratios {
-        println!("the same with dry friction at both wheels (ratio to the last line)");
-        in_turns(
-            4_096,
-            &mut [
-                ("composed from TOML  (target: 1.3)", &mut |calls| {
-                    composed(&mut simulator, calls);
-                }),
-                ("by hand", &mut |calls| {
-                    by_hand(calls);
-                }),
-            ],
-        );
-    }
+    let left = |x: &[f64; 6], volts: [f64; 2]| dry.volts(x, volts);
+    let rubbing = |calls: usize| by_hand(robot, calls, left, portable);
+    let mut simulator = checked(&format!("{PAPER}{FRICTION}"), rubbing);
+    println!("the same with dry friction at both wheels (ratio to the last line)");
+    in_turns(
+        4_096,
+        &mut [
+            ("composed from TOML  (target: 1.3)", &mut |calls| {
+                composed(&mut simulator, calls);
+            }),
+            ("by hand", &mut |calls| {
+                rubbing(calls);
+            }),
+        ],
+    );
 }
