@@ -17,8 +17,8 @@ pub(crate) struct Bound {
     pub(crate) place: Place,
     side: f64,
     is_position: bool,
-    /// The roles that its channel binds, and the signals that play them.
-    reads: Vec<(Role, usize)>,
+    /// The signals that play roles at its channel.
+    reads: [Option<usize>; Role::COUNT],
     /// Signals it reads beside those.
     signals: Vec<usize>,
     /// First of its states in the extended state vector.
@@ -38,7 +38,7 @@ impl Bound {
             Place::Output(i) => Some(i),
             _ => None,
         };
-        let named = self.reads.iter().map(|(_, signal)| *signal);
+        let named = self.reads.iter().flatten().copied();
         named.chain(self.signals.iter().copied()).chain(own)
     }
 
@@ -84,9 +84,7 @@ impl Bounds {
                     side: f64::from(channel.side),
                     is_position: matches!(channel.place, Place::Output(i)
                         if reads_position(model, channel) == Some(i)),
-                    reads: (Role::ALL.into_iter())
-                        .filter_map(|role| Some((role, reads[role as usize]?)))
-                        .collect(),
+                    reads: *reads,
                     signals: effect.signals.clone(),
                     z: plant_states + bounds.states,
                     n_z: effect.meta.states,
@@ -164,11 +162,12 @@ pub(crate) struct Scene<'a, S> {
 }
 
 impl<S: HostReal> Scene<'_, S> {
-    fn reading<'p>(&'p self, bound: &Bound, nominal: S, past: &'p dyn Past<S>) -> Reading<'p, S> {
-        let mut roles = [None; Role::COUNT];
-        for (role, signal) in &bound.reads {
-            roles[*role as usize] = self.signals.get(*signal);
-        }
+    fn reading<'p>(
+        &'p self,
+        bound: &'p Bound,
+        nominal: S,
+        past: &'p dyn Past<S>,
+    ) -> Reading<'p, S> {
         Reading {
             time: self.time,
             from: self.interval.0,
@@ -176,7 +175,8 @@ impl<S: HostReal> Scene<'_, S> {
             nominal,
             side: S::of(bound.side),
             is_position: bound.is_position,
-            roles,
+            roles: [None; Role::COUNT],
+            reads: Some(&bound.reads),
             signals: self.signals,
             past,
         }
