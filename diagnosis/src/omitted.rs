@@ -8,7 +8,6 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::noise;
-use crate::prediction::predict_with;
 use crate::problem::Problem;
 use crate::progress::Cancelled;
 
@@ -170,27 +169,6 @@ impl Problem<'_> {
             known,
         });
         Ok(omissions.collect())
-    }
-
-    /// The free runs with these values, from these initial states.
-    fn free_runs(
-        &self,
-        values: &[f64],
-        states: &[DVector<f64>],
-    ) -> Result<Vec<Vec<f64>>, Cancelled> {
-        let positions = self.positions.as_ref();
-        let runs = self.runs.iter().zip(states);
-        runs.map(|(run, x0)| {
-            predict_with(
-                positions,
-                self.model,
-                values,
-                x0.as_slice(),
-                run,
-                &self.work,
-            )
-        })
-        .collect()
     }
 
     /// The parameter `values` with all signs half as smooth, but for those whose width is estimated; none where the model

@@ -67,21 +67,35 @@ fn in_two_passes(problem: &mut Problem<'_>, settings: &FitSettings) -> Result<Fi
         ..Effort::FULL
     };
     let Arrived {
-        mut solution,
-        mut settled,
+        solution,
+        settled,
         tried,
-    } = problem.arrive(settings, effort)?;
-    if let Some(start) = problem.whiten(&solution)? {
-        let start = problem.balance(start)?;
-        (solution, settled) = problem.solve_and_tell(&start, effort)?;
-    } else if problem.reweigh_starts(&solution)? {
-        (solution, settled) = problem.solve_and_tell(&solution, effort)?;
-    }
+    } = problem.solve_in_two_passes(settings, effort)?;
     let mut fit = problem.result(&solution)?;
     let hopeless = problem.work.criteria().start.hopeless;
     let verdict = Convergence::of(fit.nrmse_fit, settled, tried, hopeless);
     fit.convergence = Some(verdict);
     Ok(fit)
+}
+
+/// The model with the values that [`fit`] finds with some `effort`, and nothing said of how well they are known.
+///
+/// # Errors
+///
+/// As [`fit`], and [`Cancelled`] wherever the work was.
+pub(crate) fn fitted_values(
+    model: &Model,
+    runs: &[Run],
+    effort: Effort,
+    work: &Work<'_>,
+) -> Result<Model, FitError> {
+    let settings = FitSettings::default();
+    let prepared = prepare(model, runs, &settings, work)?;
+    let mut problem = Problem::new(&prepared.model, &prepared.runs, work.clone())?;
+    let arrived = problem.solve_in_two_passes(&settings, effort)?;
+    let mut fitted = problem.model.clone();
+    fitted.set_values(&problem.solution(&arrived.solution).values);
+    Ok(fitted)
 }
 
 /// A model and recordings, ready for a fit.
@@ -215,6 +229,24 @@ fn limit_rows(jacobian: &mut DMatrix<f64>, steep: f64) {
 }
 
 impl Problem<'_> {
+    /// Solves from several starts, and once more where the residuals call for other weights.
+    fn solve_in_two_passes(
+        &mut self,
+        settings: &FitSettings,
+        effort: Effort,
+    ) -> Result<Arrived, FitError> {
+        let mut arrived = self.arrive(settings, effort)?;
+        let again = match self.whiten(&arrived.solution)? {
+            Some(start) => Some(self.balance(start)?),
+            None if self.reweigh_starts(&arrived.solution)? => Some(arrived.solution.clone()),
+            None => None,
+        };
+        if let Some(start) = again {
+            (arrived.solution, arrived.settled) = self.solve_and_tell(&start, effort)?;
+        }
+        Ok(arrived)
+    }
+
     /// The steepest row of the Jacobian over the one in the middle.
     pub(crate) fn steepness(&self, at: &DVector<f64>) -> Result<f64, Cancelled> {
         let (mut norms, median) = row_norms(&self.linearise(at)?.1);

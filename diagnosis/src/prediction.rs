@@ -9,6 +9,7 @@ use loopsight_model::run::Run;
 use loopsight_model::simulate::{Simulator, try_follow};
 use loopsight_model::{DUAL_WIDTH, DualOf, NARROW_WIDTH, TINY_WIDTH, derivative, variable_of};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use crate::long::ENOUGH;
 use crate::positions::{Positions, run_with};
@@ -63,6 +64,20 @@ pub(crate) struct By<'a> {
     pub(crate) parameters: &'a [usize],
     /// Initial states of the plant.
     pub(crate) states: &'a [usize],
+}
+
+/// What `simulate` makes of each of some runs from its initial state. Several runs are simulated at once.
+pub(crate) fn for_each_run<T: Send>(
+    runs: &[Run],
+    states: &[DVector<f64>],
+    simulate: impl Fn(&Run, &[f64]) -> Result<T, Cancelled> + Sync,
+) -> Result<Vec<T>, Cancelled> {
+    let of = |(run, x0): (&Run, &DVector<f64>)| simulate(run, x0.as_slice());
+    match runs {
+        // One run needs no other thread.
+        [_] => runs.iter().zip(states).map(of).collect(),
+        _ => runs.par_iter().zip(states).map(of).collect(),
+    }
 }
 
 /// Simulates `run` from `x0`, differentiated by the parameters and initial states that are listed

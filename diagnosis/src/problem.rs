@@ -12,7 +12,7 @@ use crate::flatness::Named;
 use crate::noise::Block;
 use crate::positions::Positions;
 use crate::prediction::{
-    By, Solution, estimated_states, predict_with, residuals, sensitivities_with,
+    By, Solution, estimated_states, for_each_run, predict_with, residuals, sensitivities_with,
 };
 use crate::progress::{Cancelled, Work};
 use crate::score::Tally;
@@ -239,11 +239,9 @@ impl<'a> Problem<'a> {
     pub(crate) fn residual_vector(&self, scaled: &DVector<f64>) -> Result<DVector<f64>, Cancelled> {
         let (values, states) = self.unpack(scaled);
         let mut all = Vec::with_capacity(self.rows());
-        for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
-            let positions = self.positions.as_ref();
-            let (model, x0) = (self.model, x0.as_slice());
-            let predicted = predict_with(positions, model, &values, x0, run, &self.work)?;
-            let mut residual = residuals(&predicted, run);
+        let predicted = self.free_runs(&values, &states)?;
+        for (index, (run, predicted)) in self.runs.iter().zip(&predicted).enumerate() {
+            let mut residual = residuals(predicted, run);
             for (row, value) in residual.iter_mut().enumerate() {
                 *value *= self.weight(index, row);
             }
@@ -253,6 +251,18 @@ impl<'a> Problem<'a> {
         let all = DVector::from_vec(all);
         self.remember(&all, values, states);
         Ok(all)
+    }
+
+    /// The free runs with these values, from these initial states.
+    pub(crate) fn free_runs(
+        &self,
+        values: &[f64],
+        states: &[DVector<f64>],
+    ) -> Result<Vec<Vec<f64>>, Cancelled> {
+        let (positions, model, work) = (self.positions.as_ref(), self.model, &self.work);
+        for_each_run(self.runs, states, |run, x0| {
+            predict_with(positions, model, values, x0, run, work)
+        })
     }
 
     /// Keeps the solution of least error, in case the work is cancelled.
@@ -286,15 +296,15 @@ impl<'a> Problem<'a> {
         let mut all = DVector::zeros(self.rows());
         let mut jacobian = DMatrix::zeros(self.rows(), self.scales.len());
         let mut first_row = 0;
-        for (index, (run, x0)) in self.runs.iter().zip(&states).enumerate() {
-            let x0 = x0.as_slice();
-            let positions = self.positions.as_ref();
-            let by = By {
-                parameters: &self.free,
-                states: &self.visible,
-            };
-            let (model, work) = (self.model, &self.work);
-            let s = sensitivities_with(positions, model, &values, x0, run, by, work)?;
+        let (positions, model, work) = (self.positions.as_ref(), self.model, &self.work);
+        let by = By {
+            parameters: &self.free,
+            states: &self.visible,
+        };
+        let sensitivities = for_each_run(self.runs, &states, |run, x0| {
+            sensitivities_with(positions, model, &values, x0, run, by, work)
+        })?;
+        for (index, (run, s)) in self.runs.iter().zip(sensitivities).enumerate() {
             let residual = residuals(&s.predicted, run);
             for row in 0..residual.len() {
                 let finite = run.measured()[row].is_finite();

@@ -11,9 +11,9 @@ use crate::estimate::{Estimate, strength_is_determined};
 use crate::fitted::Fit;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
-use crate::output_error;
-use crate::progress::{Cancelled, Stage, Work};
-use crate::settings::FitSettings;
+use crate::output_error::fitted_values;
+use crate::progress::{Stage, Work};
+use crate::solve::Effort;
 
 /// Corrects `model` after the last of `steps`:
 ///
@@ -346,8 +346,11 @@ fn no_worse<T: Send>(
     Ok(fitted)
 }
 
-/// Iterations of a short fit.
-const SHORT: u64 = 20;
+/// Effort of a short fit: errors are compared that differ by percents.
+const CORRECTION: Effort = Effort {
+    iterations: 20,
+    tolerance: 1e-6,
+};
 
 /// The error of a model after a short fit, and the fitted model.
 fn refitted(
@@ -355,17 +358,10 @@ fn refitted(
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<(f64, Model), FitError> {
-    let settings = FitSettings {
-        max_iterations: SHORT,
-        ..FitSettings::default()
-    };
-    let fitted = output_error::fit(model, measurements.runs, &settings, work)?;
-    if fitted.cancelled {
-        return Err(Cancelled.into());
-    }
+    let fitted = fitted_values(model, measurements.runs, CORRECTION, work)?;
     let judging = Measurements::new(measurements.judging());
-    let error = compare(&fitted.model, &judging, work)?.nrmse;
-    Ok((error, fitted.model))
+    let error = compare(&fitted, &judging, work)?.nrmse;
+    Ok((error, fitted))
 }
 
 /// Most halvings.
