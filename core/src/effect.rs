@@ -155,7 +155,8 @@ impl<'a, S: Real> Reading<'a, S> {
         }
     }
 
-    /// The same with the signal that plays `role`.
+    /// The same with the signal that plays `role`. Not for a reading that a composed model made: there
+    /// [`reads`](Self::reads) says which signal does.
     pub fn with(mut self, role: Role, signal: &'a S) -> Self {
         self.roles[role as usize] = Some(signal);
         self

@@ -94,7 +94,7 @@ pub(crate) fn fitted_values(
     let mut problem = Problem::new(&prepared.model, &prepared.runs, work.clone())?;
     let arrived = problem.solve_in_two_passes(&settings, effort)?;
     let mut fitted = problem.model.clone();
-    fitted.set_values(&problem.solution(&arrived.solution).values);
+    fitted.set_values(&problem.values_at(&arrived.solution));
     Ok(fitted)
 }
 
@@ -236,14 +236,14 @@ impl Problem<'_> {
         effort: Effort,
     ) -> Result<Arrived, FitError> {
         let mut arrived = self.arrive(settings, effort)?;
-        let again = match self.whiten(&arrived.solution)? {
-            Some(start) => Some(self.balance(start)?),
-            None if self.reweigh_starts(&arrived.solution)? => Some(arrived.solution.clone()),
-            None => None,
+        let start = if let Some(start) = self.whiten(&arrived.solution)? {
+            self.balance(start)?
+        } else if self.reweigh_starts(&arrived.solution)? {
+            arrived.solution
+        } else {
+            return Ok(arrived);
         };
-        if let Some(start) = again {
-            (arrived.solution, arrived.settled) = self.solve_and_tell(&start, effort)?;
-        }
+        (arrived.solution, arrived.settled) = self.solve_and_tell(&start, effort)?;
         Ok(arrived)
     }
 

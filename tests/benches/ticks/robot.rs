@@ -156,8 +156,8 @@ pub(crate) fn plant(criterion: &mut Criterion, ratios: bool) {
                 }),
             ],
         );
-        with_friction(&robot);
     }
+    with_friction(&robot, ratios);
     let mut group = criterion.benchmark_group("rk4_step_x4");
     let mut time = 0.0;
     simulator.reset(&[0.1, 0.5, 0.3, 0.0, 0.0, 0.0], &[0.0; 2]);
@@ -180,7 +180,7 @@ pub(crate) fn plant(criterion: &mut Criterion, ratios: bool) {
 }
 
 /// The same with dry friction at both wheels.
-fn with_friction(robot: &Robot) {
+fn with_friction(robot: &Robot, ratios: bool) {
     const FRICTION: &str = "\n[[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\", \"wheel.left\"]\nlevel = 0.8\nwidth = 0.1\n";
     let dry = black_box(Dry {
         level: 0.8,
@@ -191,6 +191,9 @@ fn with_friction(robot: &Robot) {
     let left = |x: &[f64; 6], volts: [f64; 2]| dry.volts(x, volts);
     let rubbing = |calls: usize| by_hand(robot, calls, left, portable);
     let mut simulator = checked(&format!("{PAPER}{FRICTION}"), rubbing);
+    if !ratios {
+        return;
+    }
     println!("the same with dry friction at both wheels (ratio to the last line)");
     in_turns(
         4_096,
