@@ -91,22 +91,26 @@ look() {
 LOOPSIGHT_PAGES=$folder cargo test --workspace --locked -q --lib pages_to_look_at
 pages=("$folder"/*.html)
 [ "${#pages[@]}" -ge 23 ] || complain "$folder" "there are ${#pages[@]} pages, expected at least 23"
-# look_all WIDTH [shot]: every page, in a folder of its own, so that two of these do not meet.
+shots=$#
+# look_all WIDTH: at every page, in a folder of its own, so that two of these do not meet.
 look_all() {
     local width=$1 page
     work=$all_work/$width
     mkdir "$work"
     for page in "${pages[@]}"; do
         look "$page" "$width"
-        if [ $# -gt 1 ]; then
+        if [ "$shots" -gt 0 ]; then
             { cat "$page"; waiting 9 40; } >"$work/shown.html"
             browse "$work/shown.html" "$width" 5000 --screenshot="${page%.html}_$width.png" >"$work/shot"
         fi
     done
 }
-look_all 1200 ${1:+shot} &
-look_all 420 ${1:+shot} || complain "$folder" "the look at 420 pixels failed"
-wait $! || complain "$folder" "the look at 1200 pixels failed"
+# Both in the background: behind `||` a command that fails inside would not end them.
+look_all 1200 &
+wide=$!
+look_all 420 &
+wait "$wide"
+wait $!
 
 # The check itself must see what is wrong: a page whose library is cut short.
 { sed 's/\(id="library">.\{1000\}\)[^<]*/\1/' "$folder/comparison.html"; waiting 1 40; } >"$work/cut.html"
