@@ -143,6 +143,8 @@ criteria! {
         end_region: f64 = 0.3 "1", Convention: "several times that";
         /// Share of the time there, or of the times that it came there, which it must be at its end, so that a stop is tried.
         stays_at_end: f64 = 0.25 "1", Judgement: "a motion that passes or turns anywhere is there a sixth of the time";
+        /// Share of the time near its end that a single excursion must be on the last quarter of the way, so that a stop is tried.
+        cut_off: f64 = 0.75 "1", Derived: "half way between a smooth turn, x = vt - at²/2, which is half the time on the last quarter, and one that is cut off, which is all of it";
         /// Steepest row of a Jacobian over the median one, beyond which a sign is too sharp for the integrator.
         wild: f64 = 1e4 "1", Judgement: "the derivatives are then useless";
         /// A speed of an effect below this many widths of a smoothed sign cannot be told from the smoothing.
