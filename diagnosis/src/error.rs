@@ -81,6 +81,14 @@ pub enum FitError {
         /// Its name.
         parameter: String,
     },
+    /// A parameter that differs from run to run.
+    #[error(
+        "`{parameter}` differs from run to run (`per_run` in [fit]), and recursive least squares finds one value for all: use --method output-error"
+    )]
+    PerRun {
+        /// Its name.
+        parameter: String,
+    },
     /// The plant offers no regression.
     #[error(
         "the plant `{0}` declares no controlled states, so there is no regression for recursive least squares; use --method output-error"

@@ -43,6 +43,16 @@ impl ParameterVerdict {
     }
 }
 
+/// A parameter that differs from run to run, in one of them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfRun {
+    /// Name of the run; empty where the log holds one only.
+    pub run: String,
+    /// What it is there.
+    #[serde(flatten)]
+    pub estimate: Estimate,
+}
+
 /// One estimated parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Estimate {

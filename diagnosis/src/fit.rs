@@ -81,14 +81,14 @@ fn check(model: &Model, runs: &[Run]) -> Result<(), FitError> {
     if model.measured.is_empty() {
         return Err(CompareError::NothingMeasured.into());
     }
-    if !model.parameters.iter().any(|p| p.free) {
+    if !model.parameters.iter().any(|p| p.free || p.per_run) {
         return Err(FitError::NothingFree);
     }
     let unknown: Vec<String> = model
         .parameters
         .iter()
         .enumerate()
-        .filter(|(i, p)| !p.free && p.value.is_none() && model.tie(*i).is_none())
+        .filter(|(i, p)| !p.free && !p.per_run && p.value.is_none() && model.tie(*i).is_none())
         .map(|(_, p)| p.name.clone())
         .collect();
     if !unknown.is_empty() {
@@ -96,6 +96,7 @@ fn check(model: &Model, runs: &[Run]) -> Result<(), FitError> {
     }
     let samples: usize = runs.iter().map(Run::len).sum();
     let free = model.parameters.iter().filter(|p| p.free).count();
+    let free = free + runs.len() * model.per_run().count();
     if samples * model.measured.len() <= free {
         return Err(FitError::TooFewSamples {
             samples,

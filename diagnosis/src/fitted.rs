@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::arrive::Convergence;
 use crate::compare::Comparison;
 use crate::derived::{Known, derived};
-use crate::estimate::{Estimate, ParameterVerdict};
+use crate::estimate::{Estimate, OfRun, ParameterVerdict};
 use crate::settings::Method;
 
 /// The result of a fit.
@@ -19,6 +19,9 @@ pub struct Fit {
     pub comparison: Comparison,
     /// The parameters by name.
     pub parameters: BTreeMap<String, Estimate>,
+    /// The parameters that differ from run to run, by name. Under `parameters` is the mean over the runs.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub per_run: BTreeMap<String, Vec<OfRun>>,
     /// What follows from the plant's parameters, by name: see [`loopsight_core::Derived`].
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub derived: BTreeMap<String, Estimate>,
@@ -61,7 +64,7 @@ impl Fit {
                 unit: parameter.unit.clone(),
                 std_error: None,
                 interval95: None,
-                verdict: if parameter.free {
+                verdict: if parameter.free || parameter.per_run {
                     ParameterVerdict::Unfinished
                 } else {
                     ParameterVerdict::Frozen
@@ -72,6 +75,7 @@ impl Fit {
         Self {
             comparison: Comparison::of_error(nrmse),
             parameters: parameters.collect(),
+            per_run: BTreeMap::new(),
             derived: derived(&model, None),
             method,
             nrmse_before: None,

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::criteria::ParameterCriteria;
+use crate::estimate::ParameterVerdict;
 use crate::problem::Problem;
 
 /// A parameter among the unknowns of a fit.
@@ -26,6 +27,18 @@ pub(crate) struct Flatness {
     values: DVector<f64>,
     /// Eigenvalue, the square of a singular value, up to which a direction is flat.
     least: f64,
+}
+
+impl Flatness {
+    /// What a fit says of an unknown that the data do not determine; none where they do.
+    pub(crate) fn is_open(&self, unknown: usize) -> Option<ParameterVerdict> {
+        let of = |list: &[bool]| list.get(unknown) == Some(&true);
+        match (of(&self.dead), of(&self.flat)) {
+            (true, _) => Some(ParameterVerdict::Dead),
+            (_, true) => Some(ParameterVerdict::Flat),
+            _ => None,
+        }
+    }
 }
 
 impl Problem<'_> {

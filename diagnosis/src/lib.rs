@@ -144,7 +144,7 @@ pub use criteria::{Criteria, Criterion, Reason};
 pub use derived::Known;
 pub use diagnose::diagnose;
 pub use error::{CompareError, FitError};
-pub use estimate::{Estimate, ParameterVerdict};
+pub use estimate::{Estimate, OfRun, ParameterVerdict};
 pub use experiment::{
     Considered, Drive, ExperimentLimits, Plan, Promise, Question, QuestionError, effect_at,
     experiment,

@@ -270,6 +270,6 @@ impl Problem<'_> {
                 omitted.widen(&mut covariance);
             }
         }
-        Ok(self.fit_of(&self.values_at(solution), &covariance, flatness))
+        Ok(self.fit_of(solution, &covariance, flatness))
     }
 }

@@ -16,23 +16,30 @@ use crate::positions::{Positions, run_with};
 use crate::progress::{Cancelled, Work};
 
 /// Plant states whose initial values are estimated: those that influence the measurements at the beginning of a
-/// run, or with an observer those that it observes. The others start at zero.
+/// run, or with an observer those that it observes. The others start at zero. Parameters that differ from run to run
+/// stand behind the states, and are estimated as these are.
 pub(crate) fn estimated_states(model: &Model, values: &[f64], runs: &[Run]) -> Vec<usize> {
     let observer = runs.iter().find_map(|run| run.observer());
-    observer.map_or_else(
+    let mut estimated = observer.map_or_else(
         || model.seen_states(values),
         |observer| observer.observed.clone(),
-    )
+    );
+    estimated.extend(model.n_states()..model.n_starts());
+    estimated
 }
 
 /// Whether a free parameter moves what is measured at the start of a run whatever its initial state: the surroundings of
-/// a body whose state is how much warmer it is. Then a start that is held would hold the parameter, too.
+/// a body whose state is how much warmer it is. Then a start that is held would hold the parameter, too; so it would where
+/// a parameter differs from run to run.
 pub(crate) fn moves_starts(
     model: &Model,
     solution: &Solution,
     runs: &[Run],
     work: &Work<'_>,
 ) -> Result<bool, Cancelled> {
+    if model.per_run().next().is_some() {
+        return Ok(true);
+    }
     let free: Vec<usize> = (0..model.parameters.len())
         .filter(|i| model.parameters[*i].free)
         .collect();
@@ -252,9 +259,12 @@ pub(crate) fn signal_rms(
 pub(crate) struct Solution {
     /// Parameter values of the model.
     pub(crate) values: Vec<f64>,
-    /// Initial states by run.
+    /// Initial states by run, behind them its parameters of its own ([`Model::per_run`]).
     pub(crate) states: Vec<DVector<f64>>,
 }
+
+/// Most Gauss–Newton steps where parameters are estimated with the initial states of a run.
+const ITERATIONS_OWN: usize = 12;
 
 /// Estimated initial plant states, one per run.
 pub(crate) struct InitialStates {
@@ -262,16 +272,18 @@ pub(crate) struct InitialStates {
 }
 
 impl InitialStates {
-    /// From the first sample of each run alone.
+    /// From the first sample of each run alone. What differs from run to run is as in `values`.
     pub(crate) fn guess(model: &Model, values: &[f64], runs: &[Run]) -> Self {
         let states = runs
             .iter()
             .map(|run| {
-                if run.is_empty() {
-                    DVector::zeros(model.n_states())
+                let mut start = if run.is_empty() {
+                    vec![0.0; model.n_states()]
                 } else {
-                    DVector::from_vec(model.state_from(values, run.sample(0)))
-                }
+                    model.state_from(values, run.sample(0))
+                };
+                start.extend(model.per_run().map(|i| values[i]));
+                DVector::from_vec(start)
             })
             .collect();
         Self { states }
@@ -290,6 +302,8 @@ impl InitialStates {
     ) -> Result<Self, Cancelled> {
         let mut initial = Self::guess(model, values, runs);
         let visible = estimated_states(model, values, runs);
+        let own: Vec<usize> = model.per_run().collect();
+        let iterations = if own.is_empty() { 3 } else { ITERATIONS_OWN };
         for (run, x0) in runs.iter().zip(&mut initial.states) {
             if run.len() < 2 {
                 continue;
@@ -303,7 +317,7 @@ impl InitialStates {
                 predict(model, values, x.as_slice(), run, work).map(|p| squares(&p, run))
             };
             let mut best = cost(x0)?;
-            for _ in 0..3 {
+            for _ in 0..iterations {
                 let by = By {
                     parameters: &[],
                     states: &visible,
@@ -316,6 +330,9 @@ impl InitialStates {
                 let mut candidate = x0.clone();
                 for (k, state) in visible.iter().enumerate() {
                     candidate[*state] += step[k];
+                }
+                for (value, i) in candidate.iter_mut().skip(model.n_states()).zip(&own) {
+                    *value = model.parameters[*i].declaration.nearest(*value);
                 }
                 let after = cost(&candidate)?;
                 if after >= best || after.is_nan() {
@@ -370,7 +387,8 @@ pub(crate) fn one_step(
     if run.len() < 2 {
         return Ok(());
     }
-    let (jacobian, _) = model.measurement_jacobian(values, x0);
+    let (of_run, state) = model.begun(values, x0);
+    let (jacobian, _) = model.measurement_jacobian(&of_run, state);
     let Some(inverse) = pseudo_inverse(&jacobian) else {
         return Ok(());
     };

@@ -2,7 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 
-use loopsight_model::model::Model;
+use loopsight_model::model::{Model, ModelParameter};
 use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 
@@ -26,7 +26,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) work: Work<'a>,
     /// Indices of the estimated parameters.
     pub(crate) free: Vec<usize>,
-    /// Plant states whose initial values are estimated.
+    /// Plant states whose initial values are estimated, and parameters that are estimated in each run as these are.
     pub(crate) visible: Vec<usize>,
     /// One over the standard deviation of each signal, over the root of the number of samples.
     pub(crate) weights: Vec<f64>,
@@ -104,20 +104,21 @@ impl<'a> Problem<'a> {
         let mut lower = Vec::new();
         let mut upper = Vec::new();
         for &i in &free {
-            let declaration = model.parameters[i].declaration;
-            let scale = model.parameters[i]
-                .scale()
-                .max(model.parameters[i].value.map_or(0.0, f64::abs));
-            let (low, high) = declaration.bounds();
+            let (scale, [low, high]) = range(&model.parameters[i]);
             scales.push(scale);
             lower.push(low / scale);
             upper.push(high / scale);
         }
+        let own: Vec<usize> = model.per_run().collect();
         for _ in runs {
-            for _ in &visible {
-                scales.push(1.0);
-                lower.push(f64::NEG_INFINITY);
-                upper.push(f64::INFINITY);
+            for state in &visible {
+                let own = state.checked_sub(model.n_states()).map(|k| own[k]);
+                let range = own.map(|i| range(&model.parameters[i]));
+                let (scale, [low, high]) =
+                    range.unwrap_or((1.0, [f64::NEG_INFINITY, f64::INFINITY]));
+                scales.push(scale);
+                lower.push(low / scale);
+                upper.push(high / scale);
             }
         }
         Ok(Self {
@@ -191,12 +192,12 @@ impl<'a> Problem<'a> {
         for (k, i) in self.free.iter().enumerate() {
             values[*i] = scaled[k] * self.scales[k];
         }
-        let states = (0..self.runs.len())
+        let states: Vec<DVector<f64>> = (0..self.runs.len())
             .map(|run| {
                 if let Some(known) = &self.known_states {
                     return known[run].clone();
                 }
-                let mut x0 = DVector::zeros(self.model.n_states());
+                let mut x0 = DVector::zeros(self.model.n_starts());
                 let first = self.free.len() + run * self.visible.len();
                 for (k, state) in self.visible.iter().enumerate() {
                     x0[*state] = scaled[first + k] * self.scales[first + k];
@@ -204,6 +205,11 @@ impl<'a> Problem<'a> {
                 x0
             })
             .collect();
+        // What differs from run to run is for all of them what it is on average.
+        for (k, i) in self.model.per_run().enumerate() {
+            let of_runs = states.iter().map(|x0| x0[self.model.n_states() + k]);
+            values[i] = of_runs.sum::<f64>() / states.len() as f64;
+        }
         (values, states)
     }
 
@@ -374,6 +380,13 @@ impl<'a> Problem<'a> {
             })
             .collect()
     }
+}
+
+/// The size of a parameter, and its least and largest value.
+fn range(parameter: &ModelParameter) -> (f64, [f64; 2]) {
+    let scale = parameter.scale().max(parameter.value.map_or(0.0, f64::abs));
+    let (low, high) = parameter.declaration.bounds();
+    (scale, [low, high])
 }
 
 /// The file's values, else the defaults, else zero.

@@ -62,7 +62,7 @@ pub(crate) fn for_each_row(
 ///
 /// Parameters that are free but enter non-linearly keep the model's value, or have the typical size of their
 /// declaration. Values that the samples do not determine are those of least norm. For `span` see
-/// [`for_each_row`].
+/// [`for_each_row`]. What differs from run to run has one value for all of them.
 pub(crate) fn batch(
     model: &Model,
     runs: &[Run],
@@ -70,7 +70,7 @@ pub(crate) fn batch(
     span: f64,
     work: &Work<'_>,
 ) -> Result<Vec<f64>, FitError> {
-    let mut linear = model.clone();
+    let mut linear = model.shared().into_owned();
     for parameter in &mut linear.parameters {
         if parameter.free && !parameter.declaration.linear {
             let size = parameter.declaration.nearest(parameter.scale());

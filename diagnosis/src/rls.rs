@@ -30,6 +30,10 @@ pub(crate) fn fit(
     settings: &FitSettings,
     work: &Work<'_>,
 ) -> Result<Fit, FitError> {
+    if let Some(i) = model.per_run().next() {
+        let parameter = model.parameters[i].name.clone();
+        return Err(FitError::PerRun { parameter });
+    }
     let criteria = &work.criteria().parameters;
     let mut regression = Regression::new(model, settings.scheme)?;
     let mut estimators = Vec::new();
@@ -128,6 +132,7 @@ pub(crate) fn fit(
     Ok(Fit {
         comparison: Comparison::of_error(f64::NAN),
         parameters,
+        per_run: BTreeMap::new(),
         derived: derived(&fitted, None),
         method: Method::Rls,
         nrmse_before: None,

@@ -301,7 +301,7 @@ impl Problem<'_> {
                 omitted.widen(&mut covariance);
             }
         }
-        self.fit_of(&self.values_at(at), &covariance, flatness)
+        self.fit_of(at, &covariance, flatness)
     }
 
     /// The covariance of `Jᵀr`, by the scores of groups.

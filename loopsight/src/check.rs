@@ -64,7 +64,11 @@ fn toml(path: &Path) -> Result<Checked> {
         model.plant.id,
         model.effects.len(),
         model.parameters.len(),
-        model.parameters.iter().filter(|p| p.free).count(),
+        model
+            .parameters
+            .iter()
+            .filter(|p| p.free || p.per_run)
+            .count(),
         if missing.is_empty() {
             String::new()
         } else {

@@ -140,7 +140,7 @@ impl Session {
             .parameters
             .iter()
             .zip(&self.model.composed.parameters)
-            .filter(|(new, old)| old.free && new.value != old.value)
+            .filter(|(new, old)| (old.free || old.per_run) && new.value != old.value)
             .filter_map(|(new, _)| {
                 let error = fit.parameters.get(&new.name).and_then(|p| p.std_error);
                 let value = written(new.declaration, new.value?, error);

@@ -140,7 +140,7 @@ fn improved_text(
     let is_tied = best.tied_names();
     let values: Vec<(Vec<PathSegment>, f64)> = pairs
         .into_iter()
-        .filter(|(_, from)| from.free || is_tied.contains(&from.name.as_str()))
+        .filter(|(_, from)| from.free || from.per_run || is_tied.contains(&from.name.as_str()))
         .filter_map(|(to, from)| Some((to.path.clone(), from.value?)))
         .collect();
     let text = present.with_values(&values);

@@ -63,7 +63,7 @@ impl<'m> From<&'m ModelParameter> for ModelValue<'m> {
             doc: parameter.declaration.doc,
             value: parameter.value,
             range: [parameter.declaration.min, parameter.declaration.max],
-            estimated: parameter.free,
+            estimated: parameter.free || parameter.per_run,
         }
     }
 }

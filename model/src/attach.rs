@@ -105,6 +105,7 @@ pub(crate) fn bind(
             unit,
             value: given.or(declaration.default.map(|d| d * size)),
             free: declaration.estimated && acts,
+            per_run: false,
             size,
             path: base.iter().cloned().chain(path).collect(),
         });

@@ -5,6 +5,7 @@ mod change;
 mod error;
 mod file;
 mod parameter;
+mod per_run;
 mod signals;
 mod ties;
 
@@ -113,6 +114,7 @@ impl Model {
                 unit: declaration.unit.to_owned(),
                 value: given.or(declaration.default),
                 free: declaration.estimated,
+                per_run: false,
                 size: 1.0,
                 path: prefix.iter().cloned().chain(path).collect(),
             })
@@ -170,6 +172,7 @@ impl Model {
             ties: Vec::new(),
         };
         model.tie_named(&file.fit.tied, source)?;
+        model.differ_named(&file.fit.per_run, source)?;
         let measured: Vec<(String, Sensor)> = file
             .log
             .measured

@@ -134,6 +134,7 @@ pub(crate) fn fit() -> Fit {
     Fit {
         comparison: comparison(vec![]),
         parameters: crate::fit::tests::parameters(),
+        per_run: BTreeMap::new(),
         derived: BTreeMap::new(),
         method: Method::OutputError,
         nrmse_before: None,

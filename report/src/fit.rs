@@ -9,7 +9,7 @@ use crate::intervals::{self, Interval};
 use crate::numbers::{axis, powers, rounded_times};
 use crate::page::{Context, page, section};
 use crate::thin::{MOST_POINTS, kept};
-use crate::words::fit::{how_it_went, not_determined};
+use crate::words::fit::{how_it_went, in_each_run, not_determined};
 use crate::words::{number, significant, with_error};
 
 /// The page of a fit: how far the error fell, the parameters and how well they are known, and the fitted model
@@ -89,6 +89,12 @@ fn parameters(fit: &Fit) -> String {
         );
         out.push_str(&format!(
             "<h3>Not fitted: the values of the file</h3>{table}"
+        ));
+    }
+    if !fit.per_run.is_empty() {
+        let table = estimates(&in_each_run(fit).iter().collect::<Vec<_>>());
+        out.push_str(&format!(
+            "<h3>What differs from run to run</h3><p class=\"what\">The table above has the mean over the runs.</p>{table}"
         ));
     }
     if !fit.derived.is_empty() {

@@ -227,7 +227,8 @@ fn filtered(
         unknown.iter().map(|(_, s)| (s * size).powi(2)),
     ));
     let places = unknown.iter().map(|(place, _)| *place).collect();
-    let mut linear = Linear::new(&bare, values, places, x0.as_slice(), run.input(0));
+    let (of_run, state) = model.begun(values, x0.as_slice());
+    let mut linear = Linear::new(&bare, &of_run, places, state, run.input(0));
     let (white, rounding) = sensors(model, run, &work.criteria().log);
     let nz = nx + ny;
     // Noise of a sample: rounding as a state, and all of it in what is measured.

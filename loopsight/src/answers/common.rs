@@ -201,6 +201,31 @@ pub(crate) fn estimates(from: &BTreeMap<String, loopsight_diagnosis::Estimate>) 
     of.map(|(name, p)| (name.clone(), p.into())).collect()
 }
 
+/// A parameter that differs from run to run, in one of them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub struct RunEstimate {
+    /// Name of the run; empty where the log holds one only.
+    pub run: String,
+    /// What is known of it there.
+    #[serde(flatten)]
+    pub estimate: ParameterEstimate,
+}
+
+/// Parameters that differ from run to run, by name.
+pub type PerRun = BTreeMap<String, Vec<RunEstimate>>;
+
+pub(crate) fn per_run(from: &BTreeMap<String, Vec<loopsight_diagnosis::OfRun>>) -> PerRun {
+    let each = |of: &loopsight_diagnosis::OfRun| RunEstimate {
+        run: of.run.clone(),
+        estimate: (&of.estimate).into(),
+    };
+    let of = from.iter();
+    of.map(|(name, runs)| (name.clone(), runs.iter().map(each).collect()))
+        .collect()
+}
+
 /// An effect at its channels.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]

@@ -4,7 +4,7 @@ use loopsight_diagnosis::Fit;
 use serde::Serialize;
 
 use super::Answer;
-use super::common::{Estimates, ModelErrors, estimates};
+use super::common::{Estimates, ModelErrors, PerRun, estimates, per_run};
 use super::series::{Series, SeriesOf, series};
 use crate::about::About;
 use crate::error::{Error, Result};
@@ -25,6 +25,10 @@ pub struct FitAnswer {
     pub errors: ModelErrors,
     /// The parameters by name.
     pub parameters: Estimates,
+    /// The parameters that differ from run to run (`[fit] per_run`), by name; absent where none does. Under `parameters`
+    /// is the mean over the runs.
+    #[serde(skip_serializing_if = "PerRun::is_empty")]
+    pub per_run: PerRun,
     /// What follows from the plant's parameters, by name; absent where nothing does.
     #[serde(skip_serializing_if = "Estimates::is_empty")]
     pub derived: Estimates,
@@ -112,6 +116,7 @@ impl FitAnswer {
             schema: Self::SCHEMA,
             errors: ModelErrors::from(&engine.comparison),
             parameters: estimates(&engine.parameters),
+            per_run: per_run(&engine.per_run),
             derived: estimates(&engine.derived),
             method: engine.method.into(),
             nrmse_before: engine.nrmse_before,

@@ -7,7 +7,8 @@ use loopsight_model::run::Run;
 use serde::Serialize;
 
 use super::common::{
-    Correction, EffectAt, Estimates, Failing, LogFault, Recommendation, SignalError, all, estimates,
+    Correction, EffectAt, Estimates, Failing, LogFault, PerRun, Recommendation, SignalError, all,
+    estimates, per_run,
 };
 use super::diagnose::{judged_context, pictures, two_series};
 use super::feedforward::Feedforward;
@@ -33,6 +34,10 @@ pub struct ImproveAnswer {
     pub verdict: Verdict,
     /// The parameters of the best model by name; empty where nothing was fitted.
     pub parameters: Estimates,
+    /// The parameters that differ from run to run (`[fit] per_run`), by name; absent where none does. Under `parameters`
+    /// is the mean over the runs.
+    #[serde(skip_serializing_if = "PerRun::is_empty")]
+    pub per_run: PerRun,
     /// What follows from the plant's parameters, by name; absent where nothing does.
     #[serde(skip_serializing_if = "Estimates::is_empty")]
     pub derived: Estimates,
@@ -147,6 +152,7 @@ impl ImproveAnswer {
             steps,
             verdict: engine.verdict.into(),
             parameters: best.map_or_else(Estimates::new, |best| estimates(&best.parameters)),
+            per_run: best.map_or_else(PerRun::new, |best| per_run(&best.per_run)),
             derived: best.map_or_else(Estimates::new, |best| estimates(&best.derived)),
             feedforward: (best.zip(about.sysid.as_ref()))
                 .and_then(|(best, (units, size))| Feedforward::of(best, units, *size, &shown)),

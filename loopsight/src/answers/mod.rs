@@ -31,7 +31,7 @@ pub use add::AddAnswer;
 pub use check::{CheckAnswer, Checked, FileKind, Mistake};
 pub use common::{
     Correction, EffectAt, Estimates, Failing, Level, LogFault, ModelErrors, ParameterEstimate,
-    Recommendation, SignalError,
+    PerRun, Recommendation, RunEstimate, SignalError,
 };
 pub use compare::CompareAnswer;
 pub use convert::ConvertAnswer;

@@ -142,6 +142,11 @@ pub(super) static TABLES: [PartMeta; 3] = [
                 "",
                 "parameters that are what the plant says they likely are where no recording shows them",
             ),
+            key(
+                "per_run",
+                "",
+                "parameters to estimate in each run anew: what differs from run to run, a battery or a load",
+            ),
         ],
     },
     PartMeta {

@@ -52,4 +52,7 @@ pub struct FitTable {
     /// What the plant says they are where no recording shows them ([`Unshown`](loopsight_core::Unshown)).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tied: Vec<String>,
+    /// Estimated in each run anew, since they differ from run to run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub per_run: Vec<String>,
 }

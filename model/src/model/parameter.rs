@@ -17,6 +17,8 @@ pub struct ModelParameter {
     pub value: Option<f64>,
     /// A fit estimates it.
     pub free: bool,
+    /// It differs from run to run: a fit estimates it in each, and `free` is not set.
+    pub per_run: bool,
     /// What 1 of the declaration's default, scale and starts is here, in `unit`: 1 for parameters
     /// of a plant, for those of an effect see [`loopsight_core::Channel::size`].
     pub size: f64,

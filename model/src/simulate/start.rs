@@ -11,13 +11,18 @@ const BEFORE: f64 = -1.0;
 
 impl<S: HostReal> Simulator<'_, S> {
     /// Starts a run at time 0 from the plant state `x0`. Before it `input` was applied, or nothing:
-    /// whichever the machine is closer to rest with.
+    /// whichever the machine is closer to rest with. Behind the state may stand the parameters of the run's own
+    /// ([`Model::per_run`]), which hold from now on.
     ///
     /// # Panics
     ///
     /// When there are fewer states or inputs than the plant has.
     pub fn reset(&mut self, x0: &[S], input: &[f64]) {
         let nx = self.model.n_states();
+        if let Some(own) = x0.get(nx..).filter(|own| !own.is_empty()) {
+            self.model.put_own(&mut self.values, own);
+            self.model.lower_into(&self.values, &mut self.p);
+        }
         self.time = 0.0;
         self.interval = 0.0;
         self.fresh = false;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use loopsight_diagnosis::{Estimate, Fit, Method, ParameterVerdict};
+use loopsight_diagnosis::{Estimate, Fit, Method, OfRun, ParameterVerdict};
 use loopsight_model::model::{Model, Unshown};
 
 use super::comparison;
@@ -147,10 +147,31 @@ pub(crate) fn found(fit: &Fit) -> String {
     for flat in &fit.flat {
         text.push_str(&format!("\n{}", not_determined(flat)));
     }
+    if !fit.per_run.is_empty() {
+        text.push_str(&format!(
+            "\n\n{}",
+            estimates("in each run", &in_each_run(fit))
+        ));
+    }
     if !fit.derived.is_empty() {
         text.push_str(&format!("\n\n{}", estimates("derived", &fit.derived)));
     }
     format!("{text}\n\n{}", error_fell(fit))
+}
+
+/// What differs from run to run, by parameter and run.
+pub(crate) fn in_each_run(fit: &Fit) -> BTreeMap<String, Estimate> {
+    let of = |(name, runs): (&String, &Vec<OfRun>)| {
+        let each = runs.iter().enumerate().map(|(k, of)| {
+            let run = match of.run.as_str() {
+                "" => format!("run {}", k + 1),
+                named => named.to_owned(),
+            };
+            (format!("{name}, {run}"), of.estimate.clone())
+        });
+        each.collect::<Vec<_>>()
+    };
+    fit.per_run.iter().flat_map(of).collect()
 }
 
 fn estimates(head: &str, estimates: &BTreeMap<String, Estimate>) -> String {
