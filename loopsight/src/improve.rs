@@ -1,13 +1,16 @@
 //! Improving a model: diagnose, add the missing effect, refit, until nothing more is missing.
 
-use loopsight_diagnosis::{ImproveSettings, ImprovementStep, improve};
+use loopsight_diagnosis::{
+    CompareError, ImproveSettings, Improvement, ImprovementStep, Measurements, Work, compare,
+    improve,
+};
 use loopsight_model::config::{PathSegment, TomlSource};
 use loopsight_model::model::{Attached, Model as Composed, ModelParameter};
 
-use crate::answers::ImproveAnswer;
+use crate::answers::{ImproveAnswer, Reported};
 use crate::error::Result;
 use crate::model::Model;
-use crate::session::Session;
+use crate::session::{Data, Session};
 use crate::watch::{Watch, watched};
 
 /// How a model is improved.
@@ -63,13 +66,26 @@ impl Session {
             }
             None => None,
         };
+        let reported = reported(&engine, data, &work)?;
         Ok(ImproveAnswer::new(
             engine,
             model,
+            reported,
             self.about(data),
             data.shown(),
             options.series,
         ))
+    }
+}
+
+/// The error of the best model on the log that is left for it; none where there is none, or the work was cancelled.
+fn reported(engine: &Improvement, data: &Data, work: &Work<'_>) -> Result<Option<Reported>> {
+    let (Some(best), Some((log, runs))) = (&engine.best, &data.report) else {
+        return Ok(None);
+    };
+    match compare(&best.model, &Measurements::new(runs), work) {
+        Err(CompareError::Cancelled(_)) => Ok(None),
+        found => Ok(Some(Reported::new(log, &found?))),
     }
 }
 

@@ -52,6 +52,7 @@ pub(crate) struct Data {
     pub(crate) log: String,
     pub(crate) runs: Arc<[Run]>,
     pub(crate) test: Option<(String, Arc<[Run]>)>,
+    pub(crate) report: Option<(String, Arc<[Run]>)>,
     pub(crate) faults: Vec<Fault>,
     /// The unit of a SysId log, and what it is for the model (m or rad).
     sysid: Option<(String, f64)>,
@@ -111,6 +112,7 @@ impl Session {
             model: measuring,
             runs: runs.into(),
             test: None,
+            report: None,
             faults,
             log: log.name,
         });
@@ -176,6 +178,20 @@ impl Session {
         let runs = self.further(&log)?;
         if let Some(data) = &mut self.data {
             data.test = Some((log.name, runs.into()));
+        }
+        Ok(self)
+    }
+
+    /// A log of the same machine that neither a fit nor a choice sees: [`improve`](Self::improve) says the error of the
+    /// model that came of it there.
+    ///
+    /// # Errors
+    ///
+    /// As [`Session::also`].
+    pub fn report(mut self, log: Log) -> Result<Self> {
+        let runs = self.further(&log)?;
+        if let Some(data) = &mut self.data {
+            data.report = Some((log.name, runs.into()));
         }
         Ok(self)
     }

@@ -6,7 +6,7 @@ pub(crate) use loopsight_report::words as report;
 #[cfg(feature = "cli")]
 pub(crate) use report::hundredths as percent;
 use report::run::{Learned, RegressionFigures, RunFigures, Tracked};
-pub(crate) use report::{faults, number};
+pub(crate) use report::{error, faults, number};
 
 use crate::answers::{ReferenceStep, RunAnswer, Tracking};
 

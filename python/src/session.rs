@@ -23,13 +23,14 @@ type Progress<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 #[pymethods]
 impl Session {
     #[new]
-    #[pyo3(signature = (model, log, also, test))]
+    #[pyo3(signature = (model, log, also, test, report))]
     fn new(
         py: Python<'_>,
         model: Option<Model>,
         log: Option<Log>,
         also: Vec<Log>,
         test: Option<Log>,
+        report: Option<Log>,
     ) -> PyResult<Self> {
         let made = py.detach(|| {
             let mut session = match (model, log) {
@@ -41,8 +42,11 @@ impl Session {
             for log in also {
                 session = session.also(log.0)?;
             }
-            match test {
-                Some(log) => session.test(log.0).map(Some),
+            if let Some(log) = test {
+                session = session.test(log.0)?;
+            }
+            match report {
+                Some(log) => session.report(log.0).map(Some),
                 None => Ok(Some(session)),
             }
         });

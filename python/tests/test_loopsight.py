@@ -24,7 +24,7 @@ MODEL, LOG, OTHER = HIDDEN / "model.toml", HIDDEN / "mixed.csv", HIDDEN / "multi
 
 @pytest.fixture(scope="module")
 def improved() -> ls.Improvement:
-    return ls.improve(MODEL, LOG, test=OTHER)
+    return ls.improve(MODEL, LOG, test=OTHER, report=OTHER)
 
 
 def test_ten_lines_from_files_to_a_better_model(improved: ls.Improvement, tmp_path: Path) -> None:
@@ -39,6 +39,9 @@ def test_ten_lines_from_files_to_a_better_model(improved: ls.Improvement, tmp_pa
     better.save(tmp_path / "better.toml")
     after = ls.compare(tmp_path / "better.toml", LOG)
     assert after.nrmse < 0.1 * before.nrmse
+    reported = improved.to_dict()["reported"]
+    assert reported["log"].endswith("multi_level.csv")
+    assert reported["nrmse"] == pytest.approx(ls.compare(better, OTHER).nrmse, rel=1e-3)
 
 
 def test_models_and_logs_are_paths_objects_or_frames() -> None:

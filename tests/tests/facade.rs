@@ -3,8 +3,8 @@
 
 use loopsight::answers::Answer as _;
 use loopsight::{
-    AddOptions, Ask, CompareOptions, Experiment, ExperimentOptions, FitOptions, Log, Loop, Method,
-    Model, Session, SimulateOptions, explain,
+    AddOptions, Ask, CompareOptions, Experiment, ExperimentOptions, FitOptions, ImproveOptions,
+    Log, Loop, Method, Model, Session, SimulateOptions, explain,
 };
 use proptest::collection::vec;
 use proptest::num::f64::ANY;
@@ -130,4 +130,29 @@ fn numbers_that_are_none_are_refused_in_options() {
             assert!(session.simulate(&SimulateOptions::new(experiment)).is_err());
         }
     }
+}
+
+/// The error to report is that of the improved model on a log that neither the fits nor the choice saw.
+#[test]
+fn the_error_to_report_is_that_on_a_log_apart() {
+    let folder = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../examples/hidden-effect/oscillator_coulomb_friction"
+    );
+    let read = |log: &str| Log::read(format!("{folder}/{log}.csv")).unwrap();
+    let model = || Model::from_file(format!("{folder}/model.toml")).unwrap();
+    let session = || Session::new(model(), read("mixed")).unwrap();
+    let options = ImproveOptions::default();
+    let apart = session().report(read("multi_level")).unwrap();
+    let (found, without) = (
+        apart.improve(&options).unwrap(),
+        session().improve(&options).unwrap(),
+    );
+    assert!(without.reported.is_none());
+    assert_eq!(found.steps, without.steps);
+    let reported = found.reported.as_ref().unwrap();
+    assert!(found.summary.contains(&reported.sentence()));
+    let better = Session::new(found.model().unwrap().clone(), read("multi_level")).unwrap();
+    let there = better.compare(&CompareOptions::default()).unwrap();
+    assert!((reported.errors.nrmse / there.errors.nrmse - 1.0).abs() < 1e-3);
 }

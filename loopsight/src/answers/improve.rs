@@ -46,6 +46,10 @@ pub struct ImproveAnswer {
     pub feedforward: Option<Feedforward>,
     /// Combinations of parameters that the data do not determine, in words.
     pub flat: Vec<String>,
+    /// Errors of the best model on a log that neither the fits nor the choice among effects saw; absent where no such log was
+    /// given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reported: Option<Reported>,
     /// Errors of the best model by signal, on the test log where there is one.
     pub signals: Vec<SignalError>,
     /// Where the best model still fails, the most telling first.
@@ -99,6 +103,36 @@ pub struct ImproveStep {
     pub indistinguishable_from: Vec<EffectAt>,
 }
 
+/// Errors on a log that nothing was fitted to and nothing was chosen on.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub struct Reported {
+    /// Its name.
+    pub log: String,
+    /// The errors there.
+    #[serde(flatten)]
+    pub errors: ModelErrors,
+}
+
+impl Reported {
+    pub(crate) fn new(log: &str, comparison: &Comparison) -> Self {
+        Self {
+            log: log.to_owned(),
+            errors: comparison.into(),
+        }
+    }
+
+    /// In words.
+    pub fn sentence(&self) -> String {
+        format!(
+            "On {}, which neither the fits nor the choice among effects saw, the free-run error of the improved model is {}.",
+            self.log,
+            words::error(self.errors.nrmse)
+        )
+    }
+}
+
 /// An effect of the best model that could be another one as well.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -119,6 +153,7 @@ impl ImproveAnswer {
     pub(crate) fn new(
         engine: Improvement,
         model: Option<Model>,
+        reported: Option<Reported>,
         about: About,
         shown: Arc<[Run]>,
         with_series: bool,
@@ -157,6 +192,7 @@ impl ImproveAnswer {
             feedforward: (best.zip(about.sysid.as_ref()))
                 .and_then(|(best, (units, size))| Feedforward::of(best, units, *size, &shown)),
             flat: best.map_or_else(Vec::new, |best| best.flat.clone()),
+            reported,
             signals,
             where_it_fails,
             still_open,
@@ -171,6 +207,10 @@ impl ImproveAnswer {
             about,
             shown,
         };
+        if let Some(reported) = &this.reported {
+            this.summary.push(' ');
+            this.summary.push_str(&reported.sentence());
+        }
         if let Some(feedforward) = &this.feedforward {
             for sentence in feedforward.sentences() {
                 this.summary.push(' ');
@@ -212,7 +252,10 @@ impl ImproveAnswer {
     /// A page with pictures (HTML) that opens offline; `command` stands at its foot and may be empty.
     pub fn page(&self, command: &str) -> String {
         let (before, after) = (self.before(), self.after());
-        let context = judged_context(&self.about, "what was missing", command);
+        let mut context = judged_context(&self.about, "what was missing", command);
+        context
+            .notes
+            .extend(self.reported.as_ref().map(Reported::sentence));
         loopsight_report::improvement_page(&context, &self.engine, before.as_ref(), after.as_ref())
     }
 }

@@ -44,7 +44,7 @@ pub use explain::{
 pub use feedforward::{Feedback, Feedforward};
 pub use fit::FitAnswer;
 pub use force::{ForceBin, ForceCurve, ForceDependence, MissingForce, WrittenForce};
-pub use improve::{ImproveAnswer, ImproveStep, OpenChoice};
+pub use improve::{ImproveAnswer, ImproveStep, OpenChoice, Reported};
 pub use inspect::{FittingPlant, InspectAnswer, InspectedChannel, MappedChannel};
 pub use list::{ListAnswer, Listed};
 pub use mirror::{Because, FaultKind, ParameterVerdict, Promise, Severity, Verdict};

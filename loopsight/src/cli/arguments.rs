@@ -337,6 +337,9 @@ pub(crate) struct ImproveArguments {
     /// Validate on this log; without it, on parts of LOG that are held out of the fits.
     #[arg(long, value_name = "LOG2")]
     pub(crate) test: Option<PathBuf>,
+    /// Say the error of the best model on this log, too, which neither a fit nor the choice among effects sees.
+    #[arg(long, value_name = "LOG4")]
+    pub(crate) report: Option<PathBuf>,
     /// Where no effect of the library explains the rest, add an expression for the missing force, fit it and go on.
     #[arg(long)]
     pub(crate) discover: bool,

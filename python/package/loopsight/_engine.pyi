@@ -69,7 +69,12 @@ class Answer:
 
 class Session:
     def __init__(
-        self, model: Model | None, log: Log | None, also: Sequence[Log], test: Log | None
+        self,
+        model: Model | None,
+        log: Log | None,
+        also: Sequence[Log],
+        test: Log | None,
+        report: Log | None,
     ) -> None: ...
     @property
     def model(self) -> Model: ...

@@ -45,6 +45,8 @@ class Session:
         Further logs of the same machine to fit to.
     test : log, optional
         A log of the same machine for validation: nothing is fitted to it.
+    report : log, optional
+        A log of the same machine that neither a fit nor a choice sees: `improve` says the error there.
 
     Raises
     ------
@@ -65,6 +67,7 @@ class Session:
         *,
         also: LogLike | list[LogLike] = (),
         test: LogLike | None = None,
+        report: LogLike | None = None,
     ) -> None:
         more = list(also) if isinstance(also, (list, tuple)) else [also]
         read_model = model_of(model)
@@ -74,6 +77,7 @@ class Session:
             None if read_log is None else read_log._engine,
             [log_of(one)._engine for one in more],
             None if test is None else log_of(test)._engine,
+            None if report is None else log_of(report)._engine,
         )
         self._about = ", ".join(_text(one) for one in (model, log) if one is not None)
 
@@ -231,7 +235,7 @@ def diagnose(model: ModelLike, log: LogLike | None = None, **options: Any) -> Di
 def improve(model: ModelLike, log: LogLike | None = None, **options: Any) -> Improvement:
     """The model with what was missing. As ``Session(model, log).improve()``.
 
-    The options ``also`` and ``test`` go to `Session`, all others to `Session.improve`.
+    The options ``also``, ``test`` and ``report`` go to `Session`, all others to `Session.improve`.
     """
     session, options = _session(model, log, options)
     return session.improve(**options)
@@ -299,7 +303,7 @@ def inspect(
 def _session(model: ModelLike, log: LogLike | None, options: dict[str, Any]) -> tuple[Session, dict[str, Any]]:
     """The session of a call. One argument that is no model file is a log that describes itself."""
     rest = dict(options)
-    also, test = rest.pop("also", ()), rest.pop("test", None)
+    also, test, report = rest.pop("also", ()), rest.pop("test", None), rest.pop("report", None)
     if log is None and not isinstance(model, Model) and not str(model).endswith(".toml"):
         model, log = None, model
-    return Session(model, log, also=also, test=test), rest
+    return Session(model, log, also=also, test=test, report=report), rest

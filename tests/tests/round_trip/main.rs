@@ -384,6 +384,7 @@ proptest! {
             },
             simulation: SimulationTable { max_step_s },
             fit: FitTable {
+                per_run: free.clone(),
                 free,
                 fixed,
                 tied: Vec::new(),

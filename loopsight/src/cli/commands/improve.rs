@@ -1,21 +1,28 @@
 //! `loopsight improve`.
 
-use crate::ImproveOptions;
+use crate::answers::{Feedforward, Reported};
 use crate::cli::arguments::ImproveArguments;
 use crate::cli::progress::Bar;
 use crate::cli::{files, output};
 use crate::error::Result;
 use crate::words::report;
+use crate::{ImproveOptions, Log};
 
 pub(crate) fn run(arguments: &ImproveArguments) -> Result<()> {
     let outputs = arguments.output.iter().chain(&arguments.html);
-    let session = files::session(
-        outputs,
+    let mut session = files::session(
+        outputs.clone(),
         &arguments.files,
         &arguments.also,
         &arguments.without,
         arguments.test.as_ref(),
     )?;
+    if let Some(log) = &arguments.report {
+        for output in outputs {
+            files::apart(output, &[std::slice::from_ref(log)])?;
+        }
+        session = session.report(Log::read(log)?)?;
+    }
     let bar = Bar::new();
     let options = ImproveOptions::default()
         .discover(arguments.discover)
@@ -25,10 +32,12 @@ pub(crate) fn run(arguments: &ImproveArguments) -> Result<()> {
     drop(bar);
     let answer = answer?;
     let mut text = report::improvement::text(&answer.engine);
-    if let Some(feedforward) = &answer.feedforward {
-        let text_so_far = text.trim_end().len();
-        text.truncate(text_so_far);
-        text.push_str(&format!("\n\n{}", feedforward.sentences().join("\n")));
+    let reported = answer.reported.iter().map(Reported::sentence);
+    let feedforward = answer.feedforward.iter().flat_map(Feedforward::sentences);
+    for sentences in [reported.collect::<Vec<_>>(), feedforward.collect()] {
+        if !sentences.is_empty() {
+            text = format!("{}\n\n{}", text.trim_end(), sentences.join("\n"));
+        }
     }
     output::answer(&answer, &text, arguments.json)?;
     if let Some(path) = &arguments.output {
