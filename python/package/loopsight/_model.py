@@ -111,7 +111,7 @@ class Model:
             Channels it acts on; by default all of the first kind it fits.
         """
         channels = [at] if isinstance(at, str) else list(at or [])
-        session = _engine.Session(self._engine, None, [], None)
+        session = _engine.Session(self._engine, None, [], None, None)
         added = session.add(effect, channels).model
         assert added is not None, "an effect was added to a model"
         return Model(added)
