@@ -1,9 +1,16 @@
 //! Which explanation comes first.
 
+use loopsight_core::PlaceKind;
+
 use crate::conclusion::{EffectAt, Explanation};
 use crate::criteria::{ChoiceCriteria, Criteria};
 use crate::judge::{advantage, nrmse};
 use crate::trial::Judged;
+
+/// How much rarer an effect on inputs is where these were measured behind it: beyond any [`EffectMeta::rarity`].
+///
+/// [`EffectMeta::rarity`]: loopsight_core::EffectMeta::rarity
+const RARE: u8 = 4;
 
 /// The explanation that was put first.
 pub(crate) struct Chosen {
@@ -60,7 +67,8 @@ pub(crate) fn choose(
     let leader = firsts()
         .filter(|i| complexity(*i) == simplest)
         .min_by(|a, b| error(*a).total_cmp(&error(*b)))?;
-    // A common effect comes before a rare one, and an effect at both wheels before one at one wheel. This orders
+    // A common effect comes before a rare one, and an effect at both wheels before one at one wheel. Of inputs that
+    // were measured where they act an effect on them is rare: what is late or slow then is what was measured. This orders
     // only explanations whose errors are the same as the leader's; how far the best one is ahead of them does
     // not matter here.
     let alike = (0..finalists.len()).filter(may);
@@ -68,7 +76,12 @@ pub(crate) fn choose(
         .filter(|i| complexity(*i) == simplest && same(*i, leader))
         .min_by(|a, b| {
             let channels = |i: usize| usize::MAX - explanations[i].place.at.len();
-            let rarity = |i: usize| finalists[i].candidate.meta.rarity;
+            let rarity = |i: usize| {
+                let candidate = &finalists[i].candidate;
+                let rare = candidate.model.log.inputs_measured
+                    && candidate.meta.places.contains(&PlaceKind::Input);
+                candidate.meta.rarity + if rare { RARE } else { 0 }
+            };
             let key = |i: usize| (rarity(i), channels(i));
             key(*a).cmp(&key(*b)).then(error(*a).total_cmp(&error(*b)))
         })?;

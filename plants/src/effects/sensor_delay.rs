@@ -40,7 +40,8 @@ impl Effect for SensorDelay {
                 .scaled(0.01),
         ],
         memory: true,
-        rarity: 0,
+        // Where nothing tells them apart, what is late is the command.
+        rarity: 1,
         ..EffectMeta::PLAIN
     };
 
