@@ -13,7 +13,7 @@ pub enum Shows {
     InputAtZero,
     /// The input at the channel has commands of several sizes.
     InputSizes,
-    /// The position (or head) at the channel stays at one end of where it goes, instead of turning round there.
+    /// The position (or head) at the channel stays at one end of where it goes, or turns round there again and again.
     AtEnd,
     /// The recording is one run. What changes with time alone does not begin anew with every run, and how long the machine
     /// ran between two of them is not known.

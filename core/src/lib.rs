@@ -96,7 +96,7 @@ pub use effect::{Effect, EffectArrays, EffectMeta, NoPast, Past, Physics, Readin
 pub use estimator::{Estimator, Innovation};
 pub use integrator::{Rk4, rk4_step, substeps};
 pub use limits::Limits;
-pub use parameter::Parameter;
+pub use parameter::{End, Parameter};
 pub use plant::{
     ControlAffine, Dynamics, MAX_STEP_S, Parameterization, Plant, PlantArrays, PlantMeta,
 };

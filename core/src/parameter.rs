@@ -2,6 +2,25 @@
 
 use crate::Role;
 
+/// An end of where a position goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// Its least value.
+    Lower,
+    /// Its greatest.
+    Upper,
+}
+
+impl End {
+    /// -1 at the lower end, 1 at the upper one.
+    pub const fn sign(self) -> f64 {
+        match self {
+            Self::Lower => -1.0,
+            Self::Upper => 1.0,
+        }
+    }
+}
+
 /// A number a component depends on: name, symbol, unit, range, default and one sentence.
 ///
 /// Help, TOML templates, validation, fits, documentation and reports come from this declaration.
@@ -45,8 +64,9 @@ pub struct Parameter {
     pub starts: &'static [f64],
     /// `starts` are fractions of the duration of the recording.
     pub starts_in_durations: bool,
-    /// A fit starts where the position (or head) of the recording ends: it is a limit of it.
-    pub starts_at_ends: bool,
+    /// It is a limit of the position (or head), and a fit starts where that of the recording ends. A model file that does
+    /// not give it has no such limit, and no fit looks for one.
+    pub limits: Option<End>,
     /// Sides on which it acts, see [`crate::Channel::side`]; empty: everywhere. Where an effect is attached to none of
     /// them, it is frozen in a fit.
     pub sides: &'static [i8],
@@ -78,7 +98,7 @@ impl Parameter {
             scale: 1.0,
             starts: &[],
             starts_in_durations: false,
-            starts_at_ends: false,
+            limits: None,
             sides: &[],
             shown_by: None,
         }
@@ -150,8 +170,8 @@ impl Parameter {
     }
 
     /// A limit of the position: a fit should start where that of the recording ends.
-    pub const fn starting_at_ends(mut self) -> Self {
-        self.starts_at_ends = true;
+    pub const fn limiting(mut self, end: End) -> Self {
+        self.limits = Some(end);
         self
     }
 

@@ -83,7 +83,7 @@ fn separating(a: &str, b: &str) -> String {
         "a chirp through the frequency at which it rings, small and large, and steps, sampled ten times in each swing: a spring rings at one frequency at any size".to_owned()
     } else if either(&["hysteresis"]) {
         "to and fro over ways of several lengths, from one side and from the other, slowly and again faster: a loop of hysteresis is as wide at any speed, and wider over longer ways".to_owned()
-    } else if either(&["overflow"]) {
+    } else if either(&["end_stop", "overflow"]) {
         "slowly up to the limit and harder against it, several times, and the same range again from the other side".to_owned()
     } else if either(&[
         "dead_zone",

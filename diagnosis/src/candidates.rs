@@ -7,6 +7,8 @@ use loopsight_model::run::Run;
 
 use crate::criteria::SearchCriteria;
 use crate::ends::{Ends, limited};
+use crate::estimate::ParameterVerdict;
+use crate::fitted::Fit;
 use crate::places::{channel_sets, has_another_name, unshown_part};
 use crate::positions::Positions;
 use crate::shows::can_show;
@@ -151,6 +153,28 @@ impl Candidate {
             }
         }
         chosen
+    }
+
+    /// The candidate without those of its limits that a fit ended beyond everything that moves: where the recording turns by
+    /// chance there is no stop. None where it came to all that it looked for, or to none.
+    pub(crate) fn without_unmet(&self, fit: &Fit) -> Option<Self> {
+        let limits = self.own().filter(|i| {
+            let parameter = &self.model.parameters[*i];
+            parameter.free && parameter.declaration.limits.is_some()
+        });
+        let dead = |i: &usize| {
+            let estimate = fit.parameters.get(&self.model.parameters[*i].name);
+            estimate.is_some_and(|e| e.verdict == ParameterVerdict::Dead)
+        };
+        let (unmet, met): (Vec<usize>, Vec<usize>) = limits.partition(dead);
+        if unmet.is_empty() || met.is_empty() {
+            return None;
+        }
+        let mut without = self.clone();
+        for i in unmet {
+            without.model.parameters[i].free = false;
+        }
+        Some(without)
     }
 
     /// `start` with a hundredth of the sizes of the effect: its linear parameters that are zero without it. None where
@@ -304,7 +328,7 @@ fn is_reference(declaration: &Parameter) -> bool {
 }
 
 /// Root mean square of a signal, by its role, at the channels of the last effect; 0 where there is none.
-fn last_rms(model: &Model, role: Role, rms: &[f64]) -> f64 {
+pub(crate) fn last_rms(model: &Model, role: Role, rms: &[f64]) -> f64 {
     let last = model.effects.last();
     last.map_or(0.0, |effect| role_rms(model, effect, role, rms))
 }
@@ -344,7 +368,7 @@ fn widths(model: &Model, rms: &[f64], sign_width: f64) -> Vec<(usize, f64)> {
 }
 
 /// Whether a parameter is counted per way that the machine goes.
-pub(crate) fn is_per_way(declaration: &Parameter) -> bool {
+fn is_per_way(declaration: &Parameter) -> bool {
     declaration.unit == "1/position"
 }
 

@@ -16,9 +16,12 @@ use crate::progress::{Cancelled, Work};
 /// Excursions to an end from which their turns are told from chance.
 const SEVERAL: usize = 3;
 
-/// Values before the lower and the upper end of where a signal goes, where it stays there or turns round there again and
-/// again: hardly before it, and where a stop that gives may begin. Of a signal that the log does not show, values within
-/// where the free run goes.
+/// Values before the lower and the upper end of where a signal goes, where it stays at one of them or turns round there
+/// again and again: hardly before it, and where a stop that gives may begin. Of a signal that the log does not show, values
+/// within where the free run goes.
+///
+/// What has a stop at one end may have come to the one at the other end too seldom to be seen. A fit begins before both
+/// then, and lets a limit go that nothing came to ([`crate::candidates::Candidate::without_unmet`]).
 pub(crate) type Ends = [Option<[f64; 2]>; 2];
 
 /// Where a fit of a limit starts, in widths of an end before it: a stop that gives nothing, and one that gives much.
@@ -58,9 +61,18 @@ pub(crate) fn ends(
         let tracks: Vec<Vec<f64>> = (paths.iter().zip(runs))
             .map(|(path, run)| track(model, index, path, run))
             .collect();
-        let of = |sign| end(&tracks, sign, shown.contains(&index), criteria);
         // A level has no stop below: nothing runs out upwards.
-        found[index] = [of(-1.0).filter(|_| !level), of(1.0)];
+        let signs: &[f64] = if level { &[1.0] } else { &[-1.0, 1.0] };
+        let unseen = !shown.contains(&index);
+        if unseen || signs.iter().any(|sign| stops(&tracks, *sign, criteria)) {
+            let shares = if unseen {
+                STARTS_WITHIN
+            } else {
+                STARTS.map(|share| share * criteria.end)
+            };
+            let of = |sign| signs.contains(&sign).then(|| before(&tracks, sign, shares));
+            found[index] = [-1.0, 1.0].map(|sign| of(sign).flatten());
+        }
     }
     Ok(found)
 }
@@ -114,30 +126,35 @@ fn track(model: &Model, index: usize, path: &[Vec<f64>], run: &Run) -> Vec<f64> 
     }
 }
 
-/// Values before the end of these tracks, the upper end where `sign` is 1 and the lower one where it is -1.
+/// Values before the end of these tracks by some shares of their range, the upper end where `sign` is 1 and the lower one
+/// where it is -1. None of what stands still.
+fn before(tracks: &[Vec<f64>], sign: f64, shares: [f64; 2]) -> Option<[f64; 2]> {
+    let [low, high] = extent(tracks, sign);
+    let range = high - low;
+    let normal = range.is_normal();
+    normal.then(|| shares.map(|share| sign * (high - share * range)))
+}
+
+/// The least and the greatest value of `sign` times these tracks.
+fn extent(tracks: &[Vec<f64>], sign: f64) -> [f64; 2] {
+    let all = tracks.iter().flatten().map(|x| sign * x);
+    all.filter(|x| x.is_finite())
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+            [low.min(x), high.max(x)]
+        })
+}
+
+/// Whether these tracks are stopped at an end, the upper one where `sign` is 1 and the lower one where it is -1.
 ///
 /// A motion that passes through the region, or turns round anywhere in it, is at the end itself for the share of the
 /// end in the region. One that is stopped stays longer; one that bounces off turns there whenever it comes into the
 /// region. One that is stopped only once, among many excursions that are not, is cut off there: at its highest it spends
 /// most of its time near the end on the last quarter of the way to it, where a smooth turn spends half.
-fn end(tracks: &[Vec<f64>], sign: f64, shown: bool, criteria: &SearchCriteria) -> Option<[f64; 2]> {
-    let all = || {
-        tracks
-            .iter()
-            .flatten()
-            .map(|x| sign * x)
-            .filter(|x| x.is_finite())
-    };
-    let [low, high] = [
-        all().fold(f64::INFINITY, f64::min),
-        all().fold(f64::NEG_INFINITY, f64::max),
-    ];
+fn stops(tracks: &[Vec<f64>], sign: f64, criteria: &SearchCriteria) -> bool {
+    let [low, high] = extent(tracks, sign);
     let range = high - low;
     if !range.is_normal() {
-        return None;
-    }
-    if !shown {
-        return Some(STARTS_WITHIN.map(|share| sign * (high - share * range)));
+        return false;
     }
     let near = high - criteria.end * range;
     let region = high - criteria.end_region * range;
@@ -165,8 +182,7 @@ fn end(tracks: &[Vec<f64>], sign: f64, shown: bool, criteria: &SearchCriteria) -
         }
     }
     let share = |of: usize, all: usize| of as f64 >= criteria.stays_at_end * all as f64;
-    let ends = share(stays, within) || cut_off || excursions >= SEVERAL && share(turns, excursions);
-    ends.then(|| STARTS.map(|share| sign * (high - share * criteria.end * range)))
+    share(stays, within) || cut_off || excursions >= SEVERAL && share(turns, excursions)
 }
 
 #[cfg(test)]
@@ -176,15 +192,8 @@ mod tests {
     /// The ends of a motion over 40 s.
     fn found(motion: impl Fn(f64) -> f64) -> [bool; 2] {
         let track: Vec<f64> = (0..4000).map(|k| motion(0.01 * f64::from(k))).collect();
-        let of = |sign| {
-            end(
-                std::slice::from_ref(&track),
-                sign,
-                true,
-                &SearchCriteria::DEFAULT,
-            )
-        };
-        [of(-1.0).is_some(), of(1.0).is_some()]
+        let tracks = std::slice::from_ref(&track);
+        [-1.0, 1.0].map(|sign| stops(tracks, sign, &SearchCriteria::DEFAULT))
     }
 
     /// It wanders as a sum of waves does.
@@ -221,7 +230,9 @@ mod tests {
         let track: Vec<f64> = (0..4000)
             .map(|k| wander(0.01 * f64::from(k)).min(0.5))
             .collect();
-        let start = end(&[track], 1.0, true, &SearchCriteria::DEFAULT).unwrap();
+        let shares = STARTS.map(|share| share * SearchCriteria::DEFAULT.end);
+        let start = before(&[track], 1.0, shares).unwrap();
         assert!(start.iter().all(|x| (0.3..0.5).contains(x)), "{start:?}");
+        assert!(before(&[vec![1.0; 9]], 1.0, shares).is_none());
     }
 }

@@ -60,7 +60,7 @@ pub(crate) fn channel_sets(model: &Model, meta: &'static EffectMeta) -> Vec<Vec<
     // Parameters in the channel's unit mean the same at channels of one unit only.
     let in_unit_of_channel = meta.parameters.iter().any(|p| p.unit.contains("channel"));
     // Each place has a limit of its own.
-    let limits = meta.parameters.iter().any(|p| p.starts_at_ends);
+    let limits = meta.parameters.iter().any(|p| p.limits.is_some());
     let mut sets = Vec::new();
     for (_, members) in families {
         let alike = members.len() > 1

@@ -63,7 +63,7 @@ pub(crate) fn what_is_absent(
         }
         Shows::NeverNegative => "what is measured goes below zero",
         Shows::OneRun => "the recording has several runs",
-        Shows::AtEnd => "no level stays at the end of where it goes",
+        Shows::AtEnd => "nothing stays at an end of where it goes",
         Shows::InputSizes => "the commands all have one size",
         Shows::InputAtZero => "no input rests at zero between other values",
     })

@@ -6,7 +6,7 @@ use loopsight_core::{Channel, Place, Shows};
 use loopsight_model::model::{Model, ModelParameter};
 use loopsight_model::run::Run;
 
-use crate::candidates::{Candidate, is_per_way};
+use crate::candidates::Candidate;
 use crate::judge::nrmse;
 use crate::problem::{Problem, declared};
 use crate::settings::FitSettings;
@@ -147,12 +147,12 @@ fn starts(
         if listed.is_empty() && !parameter.declaration.starts.is_empty() {
             return Vec::new();
         }
-        let at_ends = parameter.declaration.starts_at_ends;
-        let ends: Vec<f64> = candidate.ends.into_iter().flatten().flatten().collect();
+        let limits = parameter.declaration.limits.filter(|_| parameter.free);
+        let at_end = limits.and_then(|end| candidate.ends[end as usize]);
         let values: Vec<f64> = if let Some(value) = known.get(parameter.declaration.id) {
             vec![*value]
-        } else if at_ends && parameter.free && !ends.is_empty() {
-            ends.into_iter().map(nearest).collect()
+        } else if let Some(values) = at_end {
+            values.map(nearest).to_vec()
         } else if !parameter.free && listed.is_empty() {
             vec![neutral]
         } else if parameter.free && parameter.declaration.unit == "flow" && candidate.flow > 0.0 {
@@ -170,9 +170,12 @@ fn starts(
             };
             vec![nearest(neutral + step)]
         } else {
-            // What is counted per way depends on how far the machine goes.
-            let per_way = is_per_way(parameter.declaration) && candidate.reach > 0.0;
-            let unit = if per_way { candidate.reach } else { 1.0 };
+            // What is counted per way or per speed depends on how far and how fast the machine goes.
+            let unit = match parameter.declaration.unit {
+                "1/position" if candidate.reach > 0.0 => candidate.reach,
+                "1/flow" if candidate.flow > 0.0 => candidate.flow,
+                _ => 1.0,
+            };
             listed.into_iter().map(|v| nearest(v / unit)).collect()
         };
         all = all

@@ -204,7 +204,8 @@ fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     Some((judged, fit))
 }
 
-/// The full fit. None where its derivatives exceed `wild`, or where the effect only sharpens a sign.
+/// The full fit, without limits that nothing came to. None where its derivatives exceed `wild`, or where the effect only
+/// sharpens a sign.
 fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit)> {
     let model = &first.candidate.model;
     let mut problem = nominal.problem(model, None)?;
@@ -225,6 +226,14 @@ fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit
         return None;
     }
     let fit = problem.result(&found).ok()?;
+    if let Some(without) = first.candidate.without_unmet(&fit) {
+        let again = Judged {
+            candidate: without,
+            solution,
+            ..first
+        };
+        return fully(again, nominal, wild);
+    }
     let judged = Judged::of(first.candidate.clone(), model, solution, nominal)?;
     Some((judged, fit))
 }

@@ -1,4 +1,4 @@
-//! Contacts: the teeth of a gear with play, and tyres.
+//! Contacts: the teeth of a gear with play, stops at the ends of a way, and tyres.
 
 /// A gear with play: two shafts that touch only at the ends of a gap.
 ///
@@ -29,6 +29,48 @@ impl Gap {
         let side = difference.signum();
         let push = self.stiffness * (difference.abs() - half) + side * rate * self.damping;
         side * push.max(0.0)
+    }
+}
+
+/// Two stops that give, alike, with a free way between them.
+///
+/// ```text
+/// F = k δ + λ δ δ'     δ: how deep it is in the stop      λ = 3/2 α k
+/// ```
+///
+/// What comes in slowly, with a speed `v`, leaves with `(1 - α v) v`. A stop does not pull.
+///
+/// Reference: K. H. Hunt, F. R. E. Crossley (1975), "Coefficient of restitution interpreted as damping in vibroimpact",
+/// Journal of Applied Mechanics 42(2), 440–445.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stops {
+    /// Where the lower and the upper one begin, rad or m.
+    pub(crate) at: [f64; 2],
+    /// N m/rad or N/m.
+    pub(crate) stiffness: f64,
+    /// Share of the speed that is lost per speed, `α`, s/rad or s/m.
+    pub(crate) absorbed: f64,
+}
+
+impl Stops {
+    /// Torque or force at a position and a speed.
+    pub(crate) fn force(&self, position: f64, speed: f64) -> f64 {
+        let [lower, upper] = self.at;
+        // To the upper stop all is as to the lower one in a mirror.
+        let (depth, rate, side) = if position < lower {
+            (lower - position, -speed, 1.0)
+        } else if position > upper {
+            (position - upper, speed, -1.0)
+        } else {
+            return 0.0;
+        };
+        let damping = 1.5 * self.absorbed * self.stiffness * depth;
+        side * (self.stiffness * depth + damping * rate).max(0.0)
+    }
+
+    /// The factor of the depth's rate in the force, over the stiffness.
+    pub(crate) fn loss(&self) -> f64 {
+        1.5 * self.absorbed
     }
 }
 
@@ -116,6 +158,23 @@ mod tests {
             gap.torque(0.06, -100.0),
             0.0,
             "parting faster than it springs"
+        );
+    }
+
+    #[test]
+    fn stops_push_back_and_never_pull() {
+        let stops = Stops {
+            at: [-1.0, 2.0],
+            stiffness: 100.0,
+            absorbed: 0.2,
+        };
+        assert_eq!(stops.force(1.9, 5.0), 0.0);
+        assert!((stops.force(2.1, 0.0) + 10.0).abs() < 1e-9);
+        assert!((stops.force(-1.1, -1.0) - 13.0).abs() < 1e-9);
+        assert_eq!(
+            stops.force(2.1, -9.0),
+            0.0,
+            "leaving faster than it follows"
         );
     }
 

@@ -66,6 +66,7 @@ effects! {
     GravityPendulum "gravity_pendulum" Axis "an arm, horizontal at angle 0",
     LinearStiffness "linear_stiffness" Axis "a spring that pulls back to angle 0",
     CubicStiffness "cubic_stiffness" Axis "a hardening spring without linear part",
+    EndStop "end_stop" Axis "rubber stops at both ends of the way",
     Overflow "overflow" TankPair "an upper tank that runs over its edge",
     Hysteresis "hysteresis" Axis "a rubber joint to the ground, whose force depends on the way it came",
     CentrifugalOffset "centrifugal_offset" Twil "centre of mass ahead of the axle",

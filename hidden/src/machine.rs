@@ -248,6 +248,9 @@ impl Machine {
             if physics.robot == Driven::Axis {
                 torque += physics.load.torque(wheel_angle);
                 torque -= physics.joint.moved(0.5 * STEP * wheel).force;
+                if let Some(stops) = physics.stops {
+                    torque += stops.force(wheel_angle, wheel);
+                }
                 if let Some(shaft) = physics.twisting {
                     let rate = wheel - middle.far;
                     let through = shaft.torque(self.twist + 0.5 * STEP * rate, rate);

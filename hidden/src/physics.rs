@@ -1,7 +1,7 @@
 //! Everything a machine is made of, effects included.
 
 use crate::amplifier::AmplifierParts;
-use crate::contact::{Gap, Twisting, Tyre};
+use crate::contact::{Gap, Stops, Twisting, Tyre};
 use crate::driven::{Body, Driven, Motor};
 use crate::friction::Friction;
 use crate::hysteresis::Hysteresis;
@@ -89,6 +89,8 @@ pub(crate) struct Physics {
     pub(crate) load: Load,
     /// Between the shaft of the axis and the ground.
     pub(crate) joint: Hysteresis,
+    /// Of the axis.
+    pub(crate) stops: Option<Stops>,
     pub(crate) slope: Option<Slope>,
     /// Centre of mass ahead of the axle, m.
     pub(crate) mass_offset: f64,
@@ -121,6 +123,7 @@ impl Physics {
             tyre: None,
             load: Load::default(),
             joint: Hysteresis::default(),
+            stops: None,
             slope: None,
             mass_offset: 0.0,
             payload: None,

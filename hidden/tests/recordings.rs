@@ -261,6 +261,8 @@ fn the_committed_recordings_are_these() {
         (Robot::Oscillator, Hidden::Hysteresis),
         (Robot::Axis, Hidden::ElasticCoupling),
         (Robot::TankPair, Hidden::Overflow),
+        (Robot::Axis, Hidden::EndStop),
+        (Robot::Arm, Hidden::EndStop),
     ] {
         let lesson = robot.lesson(Some(effect));
         record(robot, &[(effect, 1.0)], lesson, 1)

@@ -130,6 +130,8 @@ fn improved_text(
         let own = best.parameters.iter().skip(effect.first_parameter);
         let parameters: Vec<(&str, f64)> = own
             .zip(effect.meta.parameters)
+            // A limit that was not found is not there.
+            .filter(|(parameter, declaration)| parameter.free || declaration.limits.is_none())
             .filter_map(|(parameter, declaration)| Some((declaration.id, parameter.value?)))
             .collect();
         edit(&|present| present.with_effect(effect.meta.id, &at, &parameters));

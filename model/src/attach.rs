@@ -75,7 +75,14 @@ pub(crate) fn attach(
             Some("one time is enough: keep one of the two".to_owned()),
         ));
     }
-    Ok(bind(plant, ready, at, &base, parameters))
+    let given = ready.given.clone();
+    let attached = bind(plant, ready, at, &base, parameters);
+    // A limit that the file does not give is not there.
+    let own = &mut parameters[attached.first_parameter..];
+    for (parameter, given) in own.iter_mut().zip(given) {
+        parameter.free &= parameter.declaration.limits.is_none() || given.is_some();
+    }
+    Ok(attached)
 }
 
 /// Binds an effect to channels that it fits; its table stands at `base`.

@@ -149,6 +149,18 @@ fn a_load_behind_a_spring_is_found() {
     finds_under(Experiment::Mixed, Hidden::ElasticCoupling, 0.5, 3);
 }
 
+/// Found with the two places where the stops begin; a log that comes to one of them only says nothing of the other.
+#[test]
+fn stops_are_found_where_a_joint_comes_to_them() {
+    finds(Hidden::EndStop, 1.0, 601);
+    let recording = log(&[(Hidden::EndStop, 0.5)], Experiment::Mixed, 601);
+    let diagnosis = judge(&recording, None);
+    let best = &diagnosis.candidates[0];
+    assert_eq!(best.place.effect, "end_stop");
+    assert!((best.parameters["lower"].value + 3.0).abs() < 0.01);
+    assert!(!best.parameters.contains_key("upper"));
+}
+
 /// Found with the height of its edge, in levels that stay there.
 #[test]
 fn a_tank_that_runs_over_is_found_with_its_edge() {
@@ -252,7 +264,7 @@ fn one_thread_or_two_find_the_same() {
 fn a_diagnosis_simulates_no_more_than_it_did() {
     for (hidden, table) in [
         (Hidden::CoulombFriction, [210, 390]),
-        (Hidden::LinearStiffness, [249, 268]),
+        (Hidden::LinearStiffness, [295, 306]),
     ] {
         let (_, counts) = counted(&log(&[(hidden, 1.0)], Experiment::Prbs, 1));
         for (now, before) in counts.into_iter().zip(table) {

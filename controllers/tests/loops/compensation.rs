@@ -253,10 +253,10 @@ fn every_effect_of_the_library_can_stand_in_a_loop() {
         | "sensor_offset"
         | "sensor_scale"
         | "wheel_radius_mismatch" => Some("predicted over"),
-        "backlash" | "bridge_coast" | "elastic_coupling" | "friction_drift" | "gain_drift"
-        | "hysteresis" | "input_lead" | "wheel_slip" | "payload_change" | "torque_ripple"
-        | "gravity_slope" | "gravity_pendulum" | "linear_stiffness" | "cubic_stiffness"
-        | "encoder_ripple" => Some("not compensated"),
+        "backlash" | "bridge_coast" | "elastic_coupling" | "end_stop" | "friction_drift"
+        | "gain_drift" | "hysteresis" | "input_lead" | "wheel_slip" | "payload_change"
+        | "torque_ripple" | "gravity_slope" | "gravity_pendulum" | "linear_stiffness"
+        | "cubic_stiffness" | "encoder_ripple" => Some("not compensated"),
         "coulomb_friction"
         | "stribeck_friction"
         | "directional_friction"
@@ -292,7 +292,9 @@ fn every_effect_of_the_library_can_stand_in_a_loop() {
                 };
                 // Neutral values would hide it.
                 for parameter in &mut robot.parameters {
-                    if parameter.value.is_none_or(|v| v == 0.0) {
+                    if let Some(end) = parameter.declaration.limits {
+                        parameter.value = Some(end.sign() * parameter.scale());
+                    } else if parameter.value.is_none_or(|v| v == 0.0) {
                         parameter.value = Some(parameter.scale().min(parameter.declaration.max));
                     }
                 }

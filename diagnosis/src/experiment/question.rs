@@ -1,12 +1,12 @@
 //! The question of an experiment: effects and parameters by name, and models with them at a noticeable size.
 
-use loopsight_core::{EffectMeta, Place};
+use loopsight_core::{EffectMeta, Place, Role};
 use loopsight_model::config::nearest;
 use loopsight_model::model::{Model, misfit};
 use loopsight_model::registry::{self, BuildError};
 
 use crate::EffectAt;
-use crate::candidates::suit;
+use crate::candidates::{last_rms, suit};
 use crate::criteria::Criteria;
 use crate::experiment::ExperimentLimits;
 use crate::places::channel_sets;
@@ -380,6 +380,7 @@ impl Side {
         let mut with = model.with_effect(&place.effect, &at).ok_or_else(misfit)?;
         let meta = with.effects.last().map(|e| e.meta).ok_or_else(misfit)?;
         let flow = suit(&mut with, rms, sign_width);
+        let reach = last_rms(&with, Role::Position, rms).max(last_rms(&with, Role::Head, rms));
         let first = model.parameters.len();
         let on_input = with
             .effects
@@ -393,7 +394,9 @@ impl Side {
             }
             let declaration = parameter.declaration;
             let mut listed = parameter.starts(crate::experiment::HORIZON);
-            if declaration.unit == "channel" && on_input {
+            if let Some(end) = declaration.limits {
+                listed = vec![end.sign() * reach];
+            } else if declaration.unit == "channel" && on_input {
                 listed.retain(|s| *s < MET * limit);
                 listed.reverse();
             } else if declaration.unit == "flow" && flow > 0.0 {

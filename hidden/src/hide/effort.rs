@@ -1,7 +1,7 @@
 //! Effects at the shafts. Sizes are given in volts of equivalent motor voltage: of the 9 V that
 //! drive the machine, 0.9 V is 10 %.
 
-use crate::contact::Gap;
+use crate::contact::{Gap, Stops};
 use crate::hysteresis::Hysteresis;
 use crate::physics::{Cogging, Physics};
 use crate::truth::Concealed;
@@ -184,4 +184,22 @@ pub(super) fn hysteresis(m: &mut Physics, of: Concealed) -> Concealed {
         .fitted("onward", onward, "1/rad")
         .fitted("back", back, "1/rad")
         .physical("torque_per_angle", torque, "N m/rad")
+}
+
+/// Stops 1.5 rad below and 2 rad above the start that give 0.15 rad to the 9 V of the motor.
+pub(super) fn stops(m: &mut Physics, of: Concealed) -> Concealed {
+    let at = [-1.5, 2.0].map(|angle| angle / of.size);
+    let volts_per_angle = 60.0;
+    let stops = Stops {
+        at,
+        stiffness: volts_per_angle * m.motor.torque_per_volt(),
+        absorbed: 0.2,
+    };
+    m.stops = Some(stops);
+    of.fitted("lower", at[0], "rad")
+        .fitted("upper", at[1], "rad")
+        .fitted("stiffness", volts_per_angle, "V/rad")
+        .fitted("loss", stops.loss(), "s/rad")
+        .physical("torque_per_angle", stops.stiffness, "N m/rad")
+        .physical("absorbed", stops.absorbed, "s/rad")
 }

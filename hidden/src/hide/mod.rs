@@ -47,6 +47,7 @@ pub(crate) fn hide(
         H::LinearStiffness => effort::spring(machine, concealed),
         H::CubicStiffness => effort::hardening(machine, concealed),
         H::Hysteresis => effort::hysteresis(machine, concealed),
+        H::EndStop => effort::stops(machine, concealed),
         H::Overflow => return Err(not_here),
         H::ScrubFriction => body::scrub(machine, concealed),
         H::GravitySlope => body::slope(machine, concealed),
@@ -97,8 +98,8 @@ pub(crate) fn largest(effect: Hidden) -> f64 {
         H::CentrifugalOffset => 2.1,
         // The limit would be 0.
         H::InputSaturation => 4.0,
-        // The tank would have no wall.
-        H::Overflow => 4.0,
+        // The tank would have no wall, and the arm no way.
+        H::Overflow | H::EndStop => 4.0,
         // The battery would be empty at the end.
         H::GainDrift => 6.0,
         // The bearings would have less than no friction.
@@ -114,6 +115,7 @@ fn fits(effect: Hidden, robot: Driven) -> bool {
         | H::LinearStiffness
         | H::CubicStiffness
         | H::Hysteresis
+        | H::EndStop
         | H::ElasticCoupling
         | H::SensorMagnitude => robot == Driven::Axis,
         H::ScrubFriction

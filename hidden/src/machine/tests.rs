@@ -298,3 +298,35 @@ fn the_windings_time_constant_is_a_small_delay() {
         assert!((1e-4..1e-3).contains(&share), "{robot:?}: {share}");
     }
 }
+
+/// A free shaft that comes to a stop with 3 rad/s leaves it as Hunt and Crossley's law says: from `ω dω = -k/I δ (1 + λ/k ω) dδ`
+/// the speeds before and after follow, whatever inertia and stiffness are. Between the stops it keeps its speed.
+#[test]
+fn a_shaft_is_thrown_back_by_its_stops() {
+    let mut physics = with(Driven::Axis, Hidden::EndStop, 1.0);
+    physics.motor.torque_constant = 0.0;
+    physics.motor.back_emf_constant = 0.0;
+    physics.motor.rotor_friction = 0.0;
+    let loss = physics.stops.unwrap().loss();
+    let [_, upper] = physics.stops.unwrap().at;
+    let mut machine = Machine::new(physics);
+    machine.velocities.body[0] = 3.0;
+    let (mut before, mut highest) = (3.0, 0.0f64);
+    for _ in 0..3 {
+        let deep = |machine: &Machine| machine.wheel_angles[0].clamp(-1.5, upper);
+        while deep(&machine) == machine.wheel_angles[0] {
+            machine.step([0.0; 2]);
+        }
+        assert!((machine.body()[0].abs() - before).abs() < 2e-3 * before);
+        while deep(&machine) != machine.wheel_angles[0] {
+            machine.step([0.0; 2]);
+            highest = highest.max(machine.wheel_angles[0]);
+        }
+        let after = machine.body()[0].abs();
+        let of = |v: f64| v / loss - (loss * v).ln_1p() / (loss * loss);
+        assert!((of(before) - of(-after)).abs() < 2e-3 * of(before));
+        assert!(after < 0.8 * before, "{before} {after}");
+        before = after;
+    }
+    assert!(highest > upper + 0.05 && highest < upper + 0.5, "{highest}");
+}

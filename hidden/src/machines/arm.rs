@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::{Counter, Rig, Row, Scale, Sheet, dry, midpoint, quantity};
 use crate::Hidden;
+use crate::contact::Stops;
 use crate::driven::Motor;
 use crate::friction::Friction;
 use crate::motor::Winding;
@@ -16,7 +17,7 @@ pub(crate) const SHEET: Sheet = Sheet {
     inputs: 1,
     columns: &["time_s", "voltage_V", "speed_rad_per_s", "angle_rad"],
     command: [0.0, 12.0],
-    shows: &[Hidden::CoulombFriction],
+    shows: &[Hidden::CoulombFriction, Hidden::EndStop],
     build: |phase, time_constant| Box::new(Arm::new(phase, time_constant)),
 };
 
@@ -29,7 +30,7 @@ const COUNTS: f64 = 8192.0;
 /// A bar that hangs from a joint and is lifted by a gear motor. The encoder is at zero where it hangs.
 ///
 /// ```text
-/// (I_bar + I_rotor) ω' = τ_motor(V, ω) - weight · sin(φ) + friction        weight = m g l
+/// (I_bar + I_rotor) ω' = τ_motor(V, ω) - weight · sin(φ) + friction + stops        weight = m g l
 /// I_bar = m (l² + s²/12)
 /// ```
 #[derive(Clone, Debug)]
@@ -40,6 +41,7 @@ pub(super) struct Arm {
     pub(super) weight: f64,
     motor: Motor,
     bearing: Friction,
+    stops: Option<Stops>,
     counter: Counter,
     current: f64,
     /// Speed, rad/s, and angle, rad.
@@ -65,6 +67,7 @@ impl Arm {
                 reflected_inertia: 0.0065,
             },
             bearing: Friction::default(),
+            stops: None,
             counter: Counter::new(Scale::new(TAU / COUNTS, phase[0]), SHEET.rate),
             current: 0.0,
             state: [0.0; 2],
@@ -83,7 +86,9 @@ impl Arm {
         let mut end = midpoint(start, STEP, |[speed, angle]| {
             let (torque, next) = winding.torque(self.voltage, speed);
             current = next;
-            [(torque - self.weight * angle.sin()) / inertia, speed]
+            let stopped = self.stops.map_or(0.0, |s| s.force(angle, speed));
+            let weight = self.weight * angle.sin();
+            [(torque - weight + stopped) / inertia, speed]
         });
         winding.advance(current);
         let stop = dry(&self.bearing, start[0], end[0], inertia, STEP);
@@ -144,6 +149,24 @@ impl Rig for Arm {
                     of.told("dry friction of the joint", &["joint"])
                         .fitted("level", level, "V")
                         .physical("torque", torque, "N m"),
+                )
+            }
+            Hidden::EndStop => {
+                let at = [0.1 * of.size - 0.5, 0.6 - 0.1 * of.size];
+                let volts_per_angle = 150.0;
+                let stops = Stops {
+                    at,
+                    stiffness: volts_per_angle * self.motor.torque_per_volt(),
+                    absorbed: 0.15,
+                };
+                self.stops = Some(stops);
+                Some(
+                    of.told("a bar that falls against rubber stops", &["joint"])
+                        .fitted("lower", at[0], "rad")
+                        .fitted("upper", at[1], "rad")
+                        .fitted("stiffness", volts_per_angle, "V/rad")
+                        .fitted("loss", stops.loss(), "s/rad")
+                        .physical("torque_per_angle", stops.stiffness, "N m/rad"),
                 )
             }
             _ => None,

@@ -134,6 +134,22 @@ fn the_arm_hangs_where_the_motor_holds_it() {
     assert!(hold(&mut rig, 0.9, 100).exact[1] > 1e-3);
 }
 
+/// Against a stop, motor and stop hold what gravity pulls at.
+#[test]
+fn the_arm_rests_on_its_stops() {
+    let mut rig = Arm::new(PHASE, 1e-4);
+    let told = with(&mut rig, Hidden::EndStop);
+    let row = hold(&mut rig, 12.0, 1500);
+    let depth = row.exact[1] - told.value("upper").unwrap();
+    let pushed = told.value("torque_per_angle").unwrap() * depth;
+    let driven = 12.0 * 0.0265 / (13.0 * 0.01);
+    let balance = driven - pushed - rig.weight * row.exact[1].sin();
+    assert!(
+        depth > 0.0 && balance.abs() < 1e-6,
+        "{depth} rad, {balance} N m"
+    );
+}
+
 /// Coils cut and rotor free, it swings with `√(m g l/I)` and keeps its energy.
 #[test]
 fn a_free_arm_keeps_its_energy() {

@@ -1,7 +1,7 @@
 //! A vessel that runs over.
 
 use crate::declare_effect;
-use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Role, Shows};
+use loopsight_core::{Effect, EffectMeta, End, Parameter, PlaceKind, Reading, Real, Role, Shows};
 
 /// Overflow: what stands above the edge of a vessel runs over it, and is lost.
 ///
@@ -51,7 +51,7 @@ impl Effect for Overflow {
                 .or(0.0)
                 .nonlinear()
                 .scaled(0.02)
-                .starting_at_ends(),
+                .limiting(End::Upper),
             Parameter::new(
                 "edge",
                 "b_e",
