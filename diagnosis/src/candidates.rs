@@ -205,7 +205,7 @@ pub(crate) struct Seen<'a> {
 }
 
 /// All candidates for `model`: each effect at every single channel it fits, and at all channels of a
-/// family (both wheels, all inputs), alike and each with its own parameters.
+/// family (both wheels, all inputs), alike and each with its own parameters; and those that the model file proposes.
 ///
 /// Left out are effects that the model already has at these channels, effects on signals that are not
 /// measured, and effects that cannot show in `runs`. Where the log's inputs were measured at the machine, effects
@@ -225,14 +225,21 @@ pub(crate) fn candidates(
     let sign_width = criteria.sign_width;
     let mut found = Vec::new();
     let possible = |meta: &&EffectMeta| !(model.log.inputs_measured && meta.before_input);
-    for meta in registry::effects().into_iter().filter(possible) {
-        for at in channel_sets(model, meta) {
+    let known = registry::effects().into_iter().filter(possible);
+    let known = known.map(|meta| (meta, channel_sets(model, meta), false));
+    // Those of the file's own are tried where the file says.
+    let own = model.candidates.iter().map(|proposed| {
+        let at = proposed.at.iter().map(|c| c.id).collect();
+        (proposed.meta(), vec![at], true)
+    });
+    for (meta, sets, own) in known.chain(own) {
+        for at in sets {
             let present = model
                 .effects
                 .iter()
                 .any(|e| e.meta.id == meta.id && e.at.iter().any(|c| at.contains(&c.id)));
             if present
-                || has_another_name(model, meta, &at)
+                || !own && has_another_name(model, meta, &at)
                 || unshown_part(model, &at).is_some()
                 || !can_show(model, meta, &at, runs, ends, criteria)
             {
@@ -254,7 +261,7 @@ pub(crate) fn candidates(
             let each: Vec<&[&str]> = at.chunks(1).collect();
             let ways: &[(bool, &[&[&str]])] = &[(false, &[&at]), (true, &each)];
             for (separate, sets) in ways {
-                let alike_only = meta.shared_only || meta.sided || replaces.is_some();
+                let alike_only = own || meta.shared_only || meta.sided || replaces.is_some();
                 if *separate && (at.len() < 2 || alike_only) {
                     continue;
                 }
@@ -262,7 +269,7 @@ pub(crate) fn candidates(
                 let mut flow = 0.0;
                 for set in *sets {
                     with = with.and_then(|m| m.with_effect(meta.id, set));
-                    if let Some(model) = &mut with {
+                    if let Some(model) = with.as_mut().filter(|_| !own) {
                         flow = suit(model, rms, sign_width).max(flow);
                     }
                 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use loopsight_core::{Channel, Place, Shows};
-use loopsight_model::model::{Model, ModelParameter};
+use loopsight_model::model::{Model, ModelParameter, Proposed};
 use loopsight_model::run::Run;
 
 use crate::candidates::Candidate;
@@ -53,7 +53,11 @@ pub(crate) fn first_starts(
     extent: Extent,
 ) -> Vec<Vec<f64>> {
     let mut base = nominal.values();
-    let mut known = BTreeMap::new();
+    // Of a file's own effect its author knows where to begin.
+    let own = |c: &&Proposed| c.meta().id == candidate.meta.id;
+    let proposed = nominal.candidates.iter().find(own);
+    let given = proposed.into_iter().flat_map(Proposed::given);
+    let mut known: BTreeMap<&str, f64> = given.filter_map(|(id, v)| Some((id, v?))).collect();
     if let Some((_, gone)) = &candidate.replaces {
         for parameter in &nominal.parameters[gone.clone()] {
             if let (true, Some(value)) = (parameter.free, parameter.value) {

@@ -59,8 +59,12 @@ fn toml(path: &Path) -> Result<Checked> {
     }
     let (model, _) = Composed::from_toml(&file, &text)?;
     let missing = model.missing_values();
+    let candidates = match model.candidates.len() {
+        0 => String::new(),
+        n => format!(" and {n} for a diagnosis to try"),
+    };
     let summary = format!(
-        "a model: plant `{}`, {} effects, {} parameters ({} estimated in a fit){}",
+        "a model: plant `{}`, {} effects{candidates}, {} parameters ({} estimated in a fit){}",
         model.plant.id,
         model.effects.len(),
         model.parameters.len(),

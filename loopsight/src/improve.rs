@@ -126,6 +126,10 @@ fn improved_text(
             }
             continue;
         }
+        if before.candidates.iter().any(|c| c.meta().id == id) {
+            edit(&|present| present.with_candidate(id));
+            continue;
+        }
         let at: Vec<&str> = effect.at.iter().map(|c| c.id).collect();
         let own = best.parameters.iter().skip(effect.first_parameter);
         let parameters: Vec<(&str, f64)> = own

@@ -16,14 +16,34 @@ pub(crate) fn attach(
     source: &TomlSource,
     effects: &[Attached],
 ) -> Result<Attached, Box<ConfigError>> {
+    let base: [PathSegment; 3] = ["effect".into(), index.into(), part.meta().id.into()];
+    let (ready, at) = placed(plant, part, &base, source, effects)?;
+    let given = ready.given.clone();
+    let attached = bind(plant, ready, at, &base, parameters);
+    // A limit that the file does not give is not there.
+    let own = &mut parameters[attached.first_parameter..];
+    for (parameter, given) in own.iter_mut().zip(given) {
+        parameter.free &= parameter.declaration.limits.is_none() || given.is_some();
+    }
+    Ok(attached)
+}
+
+/// The effect `part`, whose table stands at `base`, with its channels; it has to fit them, beside the `effects` that
+/// are there.
+pub(crate) fn placed(
+    plant: &'static PlantMeta,
+    part: &dyn EffectPart,
+    base: &[PathSegment],
+    source: &TomlSource,
+    effects: &[Attached],
+) -> Result<(ReadyEffect, Vec<&'static Channel>), Box<ConfigError>> {
     let meta = part.meta();
-    let base: Vec<PathSegment> = vec!["effect".into(), index.into(), meta.id.into()];
     let path =
         |more: &[PathSegment]| -> Vec<PathSegment> { base.iter().chain(more).cloned().collect() };
     if part.at().is_empty() {
         let fitting = fitting_channels(plant, meta);
         return Err(source.error(
-            &base,
+            base,
             &format!("`{}` needs `at`: the channels it acts on", meta.id),
             Some(format!(
                 "channels of `{}` where it fits: {}",
@@ -54,7 +74,7 @@ pub(crate) fn attach(
     }
     let ready = part
         .ready(plant, &at)
-        .map_err(|mistake| source.mistake(&base, mistake))?;
+        .map_err(|mistake| source.mistake(base, mistake))?;
     for (i, channel) in at.iter().enumerate() {
         if let Some(why) = misfit(channel, ready.meta) {
             let fitting = fitting_channels(plant, ready.meta);
@@ -75,14 +95,7 @@ pub(crate) fn attach(
             Some("one time is enough: keep one of the two".to_owned()),
         ));
     }
-    let given = ready.given.clone();
-    let attached = bind(plant, ready, at, &base, parameters);
-    // A limit that the file does not give is not there.
-    let own = &mut parameters[attached.first_parameter..];
-    for (parameter, given) in own.iter_mut().zip(given) {
-        parameter.free &= parameter.declaration.limits.is_none() || given.is_some();
-    }
-    Ok(attached)
+    Ok((ready, at))
 }
 
 /// Binds an effect to channels that it fits; its table stands at `base`.

@@ -190,10 +190,12 @@ impl TomlSource {
             let part = table.get(role).and_then(Item::as_table_like);
             (vec![PathSegment::from(role)], part)
         });
-        let effects = table.get("effect").and_then(Item::as_array_of_tables);
-        let effects = effects.into_iter().flatten().enumerate().map(|(i, t)| {
-            let part: &dyn toml_edit::TableLike = t;
-            (vec!["effect".into(), i.into()], Some(part))
+        let effects = ["effect", "candidate"].into_iter().flat_map(|list| {
+            let parts = table.get(list).and_then(Item::as_array_of_tables);
+            parts.into_iter().flatten().enumerate().map(move |(i, t)| {
+                let part: &dyn toml_edit::TableLike = t;
+                (vec![list.into(), i.into()], Some(part))
+            })
         });
         for (mut path, part) in roles.into_iter().chain(effects) {
             let mut keys = part.into_iter().flat_map(|t| t.iter());

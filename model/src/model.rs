@@ -6,6 +6,7 @@ mod error;
 mod file;
 mod parameter;
 mod per_run;
+mod proposed;
 mod signals;
 mod ties;
 
@@ -25,6 +26,8 @@ pub use error::ModelError;
 pub use file::{FitTable, ModelFile, SimulationTable};
 pub use loopsight_core::{Tie, Unshown};
 pub use parameter::ModelParameter;
+pub use proposed::Proposed;
+use proposed::proposed;
 pub(crate) use signals::signal_index;
 pub use signals::signals;
 use ties::Tied;
@@ -40,6 +43,8 @@ pub struct Model {
     pub parameters: Vec<ModelParameter>,
     /// Effects in order.
     pub effects: Vec<Attached>,
+    /// Effects of the file's own that are not in the model, and that a diagnosis tries.
+    pub candidates: Vec<Proposed>,
     /// What is measured, in the order of the signals.
     pub measured: Vec<MeasuredSignal>,
     /// How a log maps on the signals.
@@ -128,6 +133,7 @@ impl Model {
             effects.push(attached);
         }
         make_names_unique(&mut parameters, &effects);
+        let candidates = proposed(plant, &file.candidate, &effects, source)?;
 
         let usual = <f64 as HostReal>::dynamics(ready.dynamics).max_step_s();
         let step = file.simulation.max_step_s.unwrap_or(usual);
@@ -162,6 +168,7 @@ impl Model {
             plant,
             parameters,
             effects,
+            candidates,
             measured: Vec::new(),
             log: file.log.clone(),
             max_step: step,

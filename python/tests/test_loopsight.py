@@ -209,6 +209,17 @@ def test_a_function_is_an_effect() -> None:
     assert found.nrmse < 0.02
 
 
+def test_a_function_is_tried_by_a_diagnosis() -> None:
+    plain = ls.Model.from_file(MODEL)
+    stronger = ls.Effect(lambda flow, c: -c * flow * abs(flow) ** 3, ["mass"], "air", {"c": ls.Free(0.1, "N s^4/m^4")})
+    both = plain.with_candidate(dry).with_candidate(stronger)
+    assert both.effects == [], "they are not in the model"
+    assert ls.compare(both, LOG).nrmse == ls.compare(plain, LOG).nrmse
+    found = ls.diagnose(both, LOG)
+    names = {candidate.effect for candidate in found.candidates}
+    assert names & {"dry", "coulomb_friction"}, names
+
+
 @given(
     values=st.tuples(*[st.floats(0.1, 3.0)] * 2),
     steps=st.lists(st.sampled_from("+-*/^mxtsa"), min_size=1, max_size=6),

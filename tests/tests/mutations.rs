@@ -71,6 +71,7 @@ fn damaged_models_never_panic() {
         "expressions/pendulum.toml",
         "expressions/twil.toml",
         "own-states/clutch.toml",
+        "own-states/clutch_candidate.toml",
         "own-states/lag.toml",
     ] {
         let path = repository().join("examples").join(name);

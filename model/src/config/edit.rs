@@ -51,6 +51,33 @@ impl TomlSource {
         document.to_string()
     }
 
+    /// The text with the `[[candidate]]` of this name as the last of its effects.
+    pub fn with_candidate(&self, name: &str) -> String {
+        let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
+            return self.text.clone();
+        };
+        let Some(Item::ArrayOfTables(candidates)) = document.get_mut("candidate") else {
+            return self.text.clone();
+        };
+        let is_it = |entry: &toml_edit::Table| {
+            let mut parts = entry.iter().filter_map(|(_, part)| part.get("name"));
+            parts.any(|given| given.as_str() == Some(name))
+        };
+        let Some(index) = candidates.iter().position(is_it) else {
+            return self.text.clone();
+        };
+        let Some(mut entry) = candidates.get(index).cloned() else {
+            return self.text.clone();
+        };
+        candidates.remove(index);
+        if candidates.is_empty() {
+            document.remove("candidate");
+        }
+        place_anew(&mut entry);
+        push_effect(&mut document, entry);
+        document.to_string()
+    }
+
     /// The text with these parameters under `[fit] tied`, besides those that it has there.
     pub fn with_tied(&self, names: &[&str]) -> String {
         let Ok(mut document) = self.text.parse::<toml_edit::DocumentMut>() else {
@@ -175,6 +202,35 @@ mod tests {
             new,
             "# robot\n[plant.a]\nk = -2.5 # first\n\n[[effect]]\n[effect.b]\nat = [\"x\"]\nlevel = 0.25\n"
         );
+    }
+
+    #[test]
+    fn a_candidate_becomes_an_effect() {
+        let candidate = |name: &str| {
+            format!("# why {name}\n[[candidate]]\n[candidate.own]\nname = \"{name}\" # kept\n\n")
+        };
+        let file = format!(
+            "# mine\n[[effect]]\n[effect.drag]\n\n{}{}[log]\ntime = \"t\"\n",
+            candidate("a"),
+            candidate("b")
+        );
+        let read = |text: &str| TomlSource::parse("m.toml", text).unwrap();
+        let one = read(&file).with_candidate("b");
+        let table: toml::Table = one.parse().unwrap();
+        let effects = table["effect"].as_array().unwrap();
+        assert_eq!(
+            (effects.len(), table["candidate"].as_array().unwrap().len()),
+            (2, 1)
+        );
+        assert_eq!(effects[1]["own"]["name"].as_str(), Some("b"));
+        assert!(
+            one.contains("# why b\n[[effect]]") && one.contains("\"b\" # kept"),
+            "{one}"
+        );
+        let both: toml::Table = read(&one).with_candidate("a").parse().unwrap();
+        assert_eq!(both["effect"].as_array().unwrap().len(), 3);
+        assert!(!both.contains_key("candidate"));
+        assert_eq!(read(&one).with_candidate("c"), one);
     }
 
     #[test]

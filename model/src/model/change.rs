@@ -6,6 +6,7 @@ use serde::Deserialize;
 use super::{Attached, Model, ModelParameter};
 use crate::attach::{attach, bind, make_names_unique, misfit, shifted_already};
 use crate::config::{ConfigError, PathSegment, TomlSource};
+use crate::expression::EFFECT_PART;
 use crate::registry::{self, EffectPart};
 
 /// `[[effect]]` entries alone.
@@ -16,10 +17,16 @@ struct Entries {
 }
 
 impl Model {
-    /// The model with the effect `id` added at the channels `at`, with the effect's default
-    /// parameters. `None` when there is no such effect or it does not fit one of the channels.
+    /// The model with the effect `id` added at the channels `at`: one of the library with its default
+    /// parameters, or a [candidate](Self::candidates) of the file with those that it gives. `None` when there is no such
+    /// effect or it does not fit one of the channels.
     pub fn with_effect(&self, id: &str, at: &[&str]) -> Option<Model> {
-        let ready = registry::effect(id)?;
+        let own = self.candidates.iter().find(|c| c.is(id, at));
+        let part = if own.is_some() { EFFECT_PART.id } else { id };
+        let ready = match own {
+            Some(proposed) => proposed.ready.clone(),
+            None => registry::effect(id)?,
+        };
         let channels: Option<Vec<&'static Channel>> = at
             .iter()
             .map(|name| self.plant.channels.iter().find(|c| c.id == *name))
@@ -31,11 +38,7 @@ impl Model {
             return None;
         }
         let mut model = self.clone();
-        let base: [PathSegment; 3] = [
-            "effect".into(),
-            model.effects.len().into(),
-            ready.meta.id.into(),
-        ];
+        let base: [PathSegment; 3] = ["effect".into(), model.effects.len().into(), part.into()];
         let attached = bind(self.plant, ready, channels, &base, &mut model.parameters);
         model.effects.push(attached);
         make_names_unique(&mut model.parameters, &model.effects);

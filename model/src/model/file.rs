@@ -17,6 +17,9 @@ pub struct ModelFile {
     /// Effects, in the order they are applied.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effect: Vec<Box<dyn EffectPart>>,
+    /// Effects of the file's own that are not in the model, and that a diagnosis tries.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub candidate: Vec<Box<dyn EffectPart>>,
     /// How a log maps on the plant's signals.
     #[serde(default)]
     pub log: LogMap,

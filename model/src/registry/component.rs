@@ -108,6 +108,7 @@ pub trait EffectPart: Debug + Send + Sync {
 }
 
 /// An effect ready to be attached.
+#[derive(Clone)]
 pub struct ReadyEffect {
     /// The declaration.
     pub meta: &'static EffectMeta,

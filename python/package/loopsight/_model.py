@@ -121,6 +121,14 @@ class Model:
         text = self.to_toml().rstrip("\n")
         return Model.from_toml(f"{text}\n\n{effect.to_toml()}", self._engine.file)
 
+    def with_candidate(self, effect: Effect) -> Model:
+        """The same model, for which `diagnose` and `improve` try an effect of one's own beside those of the library.
+
+        It is not in the model: `fit`, `compare` and `simulate` do as if it were not there.
+        """
+        text = self.to_toml().rstrip("\n")
+        return Model.from_toml(f"{text}\n\n{effect.to_toml('candidate')}", self._engine.file)
+
     def to_toml(self) -> str:
         """The text it was made from, comments included, with its present values."""
         return self._engine.to_toml()

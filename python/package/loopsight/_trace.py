@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -114,7 +114,8 @@ class Free(NamedTuple):
 class Effect:
     """An effect of one's own: a function, traced once into an expression, so that it runs at the engine's speed.
 
-    It can still be called with numbers. Made by `effect`, and put into a model by `Model.with_effect`.
+    It can still be called with numbers. Made by `effect`, and put into a model by `Model.with_effect`, or proposed by
+    `Model.with_candidate`.
     """
 
     def __init__(
@@ -142,15 +143,15 @@ class Effect:
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         return self.function(*arguments, **named)
 
-    def to_toml(self) -> str:
-        """The effect as it stands in a model file."""
-        lines = ["[[effect]]", "[effect.expression]", f"name = {_quoted(self.name)}"]
+    def to_toml(self, table: Literal["effect", "candidate"] = "effect") -> str:
+        """The effect as it stands in a model file: as a part of the model, or as a candidate of a diagnosis."""
+        lines = [f"[[{table}]]", f"[{table}.expression]", f"name = {_quoted(self.name)}"]
         lines.append(f"at = [{', '.join(_quoted(channel) for channel in self.at)}]")
         lines.append(f"force = {_quoted(self.force)}")
         if summary := inspect.getdoc(self.function):
             lines.append(f"summary = {_quoted(summary.splitlines()[0])}")
         if self.parameters:
-            lines += ["", "[effect.expression.parameters]"]
+            lines += ["", f"[{table}.expression.parameters]"]
         for name, free in self.parameters.items():
             keys = [f"value = {float(free.value)!r}", f"unit = {_quoted(free.unit)}"]
             if free.range is not None:

@@ -5,6 +5,7 @@
     reason = "helpers of tests: a failure is the test's failure"
 )]
 
+mod candidates;
 mod states;
 
 use std::collections::BTreeMap;

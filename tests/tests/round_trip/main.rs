@@ -463,6 +463,7 @@ fn models_of_the_registry() {
         "expressions/robot.toml",
         "expressions/twil.toml",
         "own-states/clutch.toml",
+        "own-states/clutch_candidate.toml",
         "own-states/oscillator.toml",
     ];
     let own = files.map(|name| {
