@@ -128,17 +128,20 @@ fn what_is_documented_works() {
         .skip(1)
         .map(|b| b.split("```").next().unwrap())
         .collect();
-    assert_eq!(blocks.len(), 4);
+    assert_eq!(blocks.len(), 5);
     let twil = std::fs::read_to_string(repository().join("examples/twil/model.toml")).unwrap();
     let with = model(&format!("{twil}\n{}", blocks[0]));
     assert_eq!(with.effects[0].at.len(), 2);
     let oscillator = "[plant.oscillator.physical]\nmass = 2.0\nstiffness = 5e4\ndamping = 10.0\n";
     let with = model(&format!("{oscillator}\n{}", blocks[1]));
     assert_eq!(with.effects[0].meta.states, 1);
-    let pendulum = model(blocks[2]);
+    let with = model(&format!("[plant.dc_axis]\n{}", blocks[2]));
+    assert!(with.effects.is_empty());
+    assert_eq!(with.candidates.len(), 1);
+    let pendulum = model(blocks[3]);
     assert_eq!(pendulum.parameters.len(), 4);
     assert!(pendulum.affine().is_some());
-    let with = model(&format!("[plant.dc_axis]\n{}", blocks[3]));
+    let with = model(&format!("[plant.dc_axis]\n{}", blocks[4]));
     assert_eq!(with.parameters.last().unwrap().name, "discovered.c");
 }
 
