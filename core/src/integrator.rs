@@ -19,9 +19,11 @@ pub fn substeps(span: f64, longest: f64) -> usize {
         return 1;
     }
     // A hair above a whole number is rounding in the time stamps, not a longer interval.
-    let steps = libm::ceil(ratio - 1e-6);
-    if steps < 1e6 {
-        (steps as usize).max(1)
+    let ratio = ratio - 1e-6;
+    if ratio < 1e6 {
+        // Rounded up; cheaper than the library's on a machine that has no instruction for it.
+        let whole = ratio as usize;
+        (whole + usize::from(ratio > whole as f64)).max(1)
     } else {
         1_000_000
     }
