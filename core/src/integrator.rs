@@ -1,6 +1,6 @@
 //! The classical fourth-order Runge–Kutta method with a fixed sub-step rule.
 
-use crate::Real;
+use crate::{Array, Real};
 
 /// Number of equal steps, none longer than `longest`, that make up `span` (both s).
 ///
@@ -19,9 +19,11 @@ pub fn substeps(span: f64, longest: f64) -> usize {
         return 1;
     }
     // A hair above a whole number is rounding in the time stamps, not a longer interval.
-    let steps = libm::ceil(ratio - 1e-6);
-    if steps < 1e6 {
-        (steps as usize).max(1)
+    let ratio = ratio - 1e-6;
+    if ratio < 1e6 {
+        // Rounded up; cheaper than the library's on a machine that has no instruction for it.
+        let whole = ratio as usize;
+        (whole + usize::from(ratio > whole as f64)).max(1)
     } else {
         1_000_000
     }
@@ -117,17 +119,21 @@ impl<B: Clone> Rk4<B> {
 /// ```
 #[inline]
 pub fn rk4_step<S: Real, const N: usize>(x: &mut [S; N], h: S, f: impl Fn(&[S; N]) -> [S; N]) {
+    rk4_stages(x, h, |_, x| f(x));
+}
+
+/// The same, where the rate is told the stage, 0 to 3, as in [`Rk4::step`].
+#[inline(always)]
+pub(crate) fn rk4_stages<S: Real, A: Array<S>>(x: &mut A, h: S, mut f: impl FnMut(usize, &A) -> A) {
     let half = h * S::of(0.5);
     let two = S::of(2.0);
-    let along = |x: &[S; N], rate: &[S; N], h: S| -> [S; N] {
-        core::array::from_fn(|i| x[i] + rate[i].times(h))
-    };
-    let k1 = f(x);
-    let k2 = f(&along(x, &k1, half));
-    let k3 = f(&along(x, &k2, half));
-    let k4 = f(&along(x, &k3, h));
+    let along = |x: &A, rate: &A, h: S| A::from_fn(|i| x[i] + rate[i].times(h));
+    let k1 = f(0, x);
+    let k2 = f(1, &along(x, &k1, half));
+    let k3 = f(2, &along(x, &k2, half));
+    let k4 = f(3, &along(x, &k3, h));
     let sixth = h * S::of(1.0 / 6.0);
-    for i in 0..N {
+    for i in 0..A::LENGTH {
         x[i] += (k1[i] + k2[i].times(two) + k3[i].times(two) + k4[i]).times(sixth);
     }
 }

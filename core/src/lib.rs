@@ -69,12 +69,14 @@ mod clock;
 mod controller;
 mod derived;
 mod driver;
+mod dynamics;
 mod effect;
 mod estimator;
 mod integrator;
 pub mod learning;
 pub mod limits;
 mod parameter;
+mod physics;
 mod plant;
 mod real;
 mod signal;
@@ -92,14 +94,16 @@ pub use clock::{Clock, SimulatedClock};
 pub use controller::{AffineModel, Command, ControlError, Controller, Quantity};
 pub use derived::Derived;
 pub use driver::{Driver, DriverError, DriverFault, Sample};
-pub use effect::{Effect, EffectArrays, EffectMeta, NoPast, Past, Physics, Reading, Shows};
+#[doc(hidden)]
+pub use dynamics::steps_under;
+pub use dynamics::{Act, Dynamics, Steps, Under};
+pub use effect::{Effect, EffectArrays, EffectMeta, NoPast, Past, Reading, Shows};
 pub use estimator::{Estimator, Innovation};
 pub use integrator::{Rk4, rk4_step, substeps};
 pub use limits::Limits;
 pub use parameter::{End, Parameter};
-pub use plant::{
-    ControlAffine, Dynamics, MAX_STEP_S, Parameterization, Plant, PlantArrays, PlantMeta,
-};
+pub use physics::{Now, Physics, Spot};
+pub use plant::{ControlAffine, MAX_STEP_S, Parameterization, Plant, PlantArrays, PlantMeta};
 pub use real::Real;
 pub use signal::Signal;
 pub use tick::{Loop, Observation, Observer, Tick, TickError, TickRecord};

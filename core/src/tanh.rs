@@ -1,4 +1,4 @@
-//! The hyperbolic tangent in single precision.
+//! The hyperbolic tangent in single and in double precision.
 
 /// From here on `tanh x` is taken for 1; it is less by 3.4e-7 at most.
 const LIMIT: f32 = 7.8;
@@ -42,6 +42,106 @@ pub(crate) fn tanhf(x: f32) -> f32 {
     x * above / below
 }
 
+/// `P` less its 1, by ascending powers of `s²`.
+const ABOVE: [f64; 3] = [
+    0.128_166_899_489_241_76,
+    0.002_792_957_722_830_962,
+    7.359_723_449_007_344e-6,
+];
+
+/// `Q` less its 1.
+const BELOW: [f64; 3] = [
+    0.461_500_232_822_575_1,
+    0.023_293_035_330_357_61,
+    0.000_206_594_425_444_100_63,
+];
+
+/// `(P - Q)/s²`.
+const BETWEEN: [f64; 3] = [
+    ABOVE[0] - BELOW[0],
+    ABOVE[1] - BELOW[1],
+    ABOVE[2] - BELOW[2],
+];
+
+/// `ln 2/2` in two parts: the first with so few digits that 54 times it is exact.
+const HALF_LN_2: [f64; 2] = [0.346_573_590_279_831_5, 1.411_764_528_151_578_9e-13];
+/// `2/ln 2`.
+const PER_HALF_LN_2: f64 = 2.885_390_081_777_926_8;
+/// So much less than `x` in halves of `ln 2` is rounded to `k`: half for rounding down, the rest so that `s` stays large
+/// enough for two terms of one sign.
+const LATE: f64 = 1.1;
+/// Up to here `k` would be 0; `tanh x` is just above 1/2.
+const SMALL: f64 = 0.5545;
+/// Added to a number below 2⁵¹ it leaves the nearest whole number in the lowest bits.
+const WHOLE: f64 = 6_755_399_441_055_744.0;
+/// From here on `tanh x` is nearest to 1.
+const ONE_FROM: f64 = 19.1;
+/// Where the exponent of a number begins.
+const EXPONENT: u32 = 52;
+/// The exponent of 1.
+const BIAS: u64 = 1023;
+
+/// `tanh x` to two units of the last digit, 0.3 on average; odd, and never beyond 1.
+///
+/// ```text
+/// |x| = k ln 2/2 + s        e = 2⁻ᵏ        tanh s ≈ s P(s²)/Q(s²)
+/// k = 0:  tanh |x| = s + s (P - Q)/Q
+/// k > 0:  tanh |x| = 1 - 2 e (Q - s P)/((1 + e) Q + (1 - e) s P)
+/// ```
+///
+/// The last line is the sum formula with `tanh(k ln 2/2) = (1 - e)/(1 + e)`, so one quotient does it all, without an
+/// exponential. In both lines what rounding spoils is the small one of two terms. `k` is 0 up to 0.5545, where
+/// `tanh x` is 1/2, and then the whole number that leaves `s` between 0.208 and 0.555.
+///
+/// `P` and `Q` of degree 3, both 1 at zero, meet `tanh s/s` at the zeros of a Chebyshev polynomial in `s²`, shifted so
+/// that one of them is zero itself (solved in 60 digits). They are off by 1.3e-19 of the value at most, a thousandth of
+/// what rounding adds. Measured against 120 bits, 180 000 numbers from 1e-300 to 22: 1.99 units at most, beyond
+/// 2 and below 0.34 no more than 0.6. A larger `x` may have a value that is smaller by two units, near `ln 2`.
+///
+/// It replaces the library's, which goes by way of `expm1`, for the reason [`tanhf`] gives. It has only sums,
+/// products and one quotient, so it gives the same digits on every machine.
+///
+/// Reference: J. F. Hart et al. (1968), "Computer Approximations" (argument reduction, and the hyperbolic
+/// tangent by its sum formula); W. J. Cody, W. Waite (1980), "Software Manual for the Elementary Functions", ch. 6
+/// (a constant in two parts) and 13 (`tanh` as `s + s R(s²)`); E. W. Cheney (1966) (interpolation at the zeros of
+/// Chebyshev polynomials).
+pub(crate) fn tanh(x: f64) -> f64 {
+    let size = x.abs();
+    if size >= ONE_FROM {
+        return 1f64.copysign(x);
+    }
+    if size <= SMALL {
+        let t = size * size;
+        return (size + size * (t * between(t)) / below(t)).copysign(x);
+    }
+    let shifted = (size * PER_HALF_LN_2 - LATE) + WHOLE;
+    let k = shifted - WHOLE;
+    let e = f64::from_bits((BIAS - (shifted.to_bits() & 63)) << EXPONENT);
+    let s = (size - k * HALF_LN_2[0]) - k * HALF_LN_2[1];
+    let t = s * s;
+    let (above, below) = (s * above(t), below(t));
+    let rest = (e + e) * (below - above) / ((1.0 + e) * below + (1.0 - e) * above);
+    (1.0 - rest).copysign(x)
+}
+
+/// `P` where `t = s²`.
+#[inline(always)]
+fn above(t: f64) -> f64 {
+    (1.0 + t * ABOVE[0]) + t * t * (ABOVE[1] + t * ABOVE[2])
+}
+
+/// `Q`.
+#[inline(always)]
+fn below(t: f64) -> f64 {
+    (1.0 + t * BELOW[0]) + t * t * (BELOW[1] + t * BELOW[2])
+}
+
+/// `(P - Q)/t`.
+#[inline(always)]
+fn between(t: f64) -> f64 {
+    BETWEEN[0] + t * (BETWEEN[1] + t * BETWEEN[2])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,5 +169,50 @@ mod tests {
         }
         assert!(tanhf(f32::NAN).is_nan());
         assert_eq!(tanhf(f32::INFINITY), 1.0);
+    }
+
+    /// Values known to 60 digits, on both sides of where `k` changes.
+    #[test]
+    fn double_precision_has_its_last_digit_but_two() {
+        for (x, exact) in [
+            (1e-5, 9.999_999_999_666_668e-6),
+            (0.1, 0.099_667_994_624_955_82),
+            (0.25, 0.244_918_662_403_709_13),
+            (0.5, 0.462_117_157_260_009_74),
+            (0.55, 0.500_520_211_190_235_3),
+            (0.626_639_424_891_792_1, 0.555_733_859_334_804),
+            (0.859_717_087_612_655_9, 0.696_111_880_366_001_6),
+            (1.5, 0.905_148_253_644_866_4),
+            (3.0, 0.995_054_753_686_730_5),
+            (8.0, 0.999_999_774_929_675_8),
+            (18.5, 0.999_999_999_999_999_8),
+            (19.1, 1.0),
+        ] {
+            let (y, exact): (f64, f64) = (tanh(x), exact);
+            assert!(y.to_bits().abs_diff(exact.to_bits()) <= 2, "{x}: {y}");
+        }
+    }
+
+    /// Numbers of every size, against the library's, which is off by one unit itself.
+    #[test]
+    fn double_precision_is_that_of_the_library() {
+        let (mut worst, mut before) = (0, 0.0);
+        // Some 2 000 numbers of each power of two, odd steps that show every low bit.
+        for bits in (0..=f64::INFINITY.to_bits()).step_by((1 << 41) + 12_345) {
+            let x = f64::from_bits(bits);
+            let y = tanh(x);
+            assert!((0.0..=1.0).contains(&y), "{x}: {y}");
+            assert_eq!(tanh(-x).to_bits(), (-y).to_bits());
+            worst = worst.max(y.to_bits().abs_diff(libm::tanh(x).to_bits()));
+            assert!(y >= before, "{x}");
+            before = y;
+        }
+        println!("worst: {worst} units");
+        assert!(worst <= 3);
+        assert!(tanh(f64::NAN).is_nan());
+        assert_eq!(tanh(f64::INFINITY), 1.0);
+        for x in [0.0, f64::from_bits(1), f64::MIN_POSITIVE, 1e-9] {
+            assert_eq!(tanh(x), x);
+        }
     }
 }

@@ -3,7 +3,10 @@
 use core::fmt;
 
 use crc::{CRC_32_ISCSI, Crc};
-use serde::{Serialize, de::DeserializeOwned};
+use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use crate::Measured;
 
 /// Longest message with its checksum, bytes.
 pub const MESSAGE: usize = 896;
@@ -48,13 +51,12 @@ impl core::error::Error for FrameError {}
 ///
 /// [`FrameError::TooLong`] if the message does not fit; the messages of this crate do.
 pub fn encode<T: Serialize>(message: &T, buffer: &mut [u8; LONGEST]) -> Result<usize, FrameError> {
-    let mut plain = [0; MESSAGE];
-    let plain = postcard::to_slice_crc32(message, &mut plain, SUM.digest())
-        .map_err(|_| FrameError::TooLong)?;
-    let length = cobs::encode(plain, buffer);
-    let end = buffer.get_mut(length).ok_or(FrameError::TooLong)?;
-    *end = 0;
-    Ok(length + 1)
+    // Checksum and separators are made as the bytes come: no copy of the message, and no second buffer to clear.
+    let full = |_| FrameError::TooLong;
+    let cobs = Cobs::try_new(Slice::new(buffer)).map_err(full)?;
+    let sum = CrcModifier::new(cobs, SUM.digest());
+    let frame = postcard::serialize_with_flavor(message, sum).map_err(full)?;
+    Ok(frame.len())
 }
 
 /// Finds frames in a stream of bytes.
@@ -79,6 +81,13 @@ impl Default for Decoder {
 impl Decoder {
     /// Takes one byte. When the byte ends a frame, returns its message or what is wrong with it.
     pub fn take<T: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<T, FrameError>> {
+        let whole = self.whole(byte)?;
+        Some(whole.and_then(|frame| frame.message()))
+    }
+
+    /// Takes one byte. When the byte ends a frame, returns that if its checksum is right.
+    #[inline]
+    pub fn whole(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
         if byte != 0 {
             match self.buffer.get_mut(self.length) {
                 Some(to) => {
@@ -89,13 +98,19 @@ impl Decoder {
             }
             return None;
         }
+        self.end()
+    }
+
+    /// A frame is over. A function of its own: all bytes but one have no use for it.
+    #[inline(never)]
+    fn end(&mut self) -> Option<Result<Frame<'_>, FrameError>> {
         let (length, overrun) = (self.length, self.overrun);
         self.clear();
         if overrun {
             return Some(Err(FrameError::TooLong));
         }
         // Zeros in a row are no frames: a line may begin with one.
-        (length > 0).then(|| decode(&mut self.buffer[..length]))
+        (length > 0).then(|| Frame::new(&mut self.buffer[..length]))
     }
 
     /// Forgets what has come of a frame.
@@ -110,12 +125,103 @@ impl Decoder {
     }
 }
 
-fn decode<T: DeserializeOwned>(frame: &mut [u8]) -> Result<T, FrameError> {
-    let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Cut)?;
-    let plain = frame.get(..length).ok_or(FrameError::Cut)?;
-    // The checksum covers the whole frame: bytes after the message are an error.
-    match postcard::take_from_bytes_crc32(plain, SUM.digest()) {
-        Ok((message, [])) => Ok(message),
-        _ => Err(FrameError::Broken),
+/// A message in its bytes, whose checksum was right.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a>(&'a [u8]);
+
+impl<'a> Frame<'a> {
+    fn new(frame: &'a mut [u8]) -> Result<Self, FrameError> {
+        let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Cut)?;
+        let all = frame.get(..length).ok_or(FrameError::Cut)?;
+        let (plain, sum) = all.split_last_chunk().ok_or(FrameError::Broken)?;
+        if SUM.checksum(plain) != u32::from_le_bytes(*sum) {
+            return Err(FrameError::Broken);
+        }
+        Ok(Self(plain))
+    }
+
+    /// The message.
+    ///
+    /// # Errors
+    ///
+    /// [`FrameError::Broken`] where the bytes are another one, or more than one.
+    pub fn message<T: DeserializeOwned>(self) -> Result<T, FrameError> {
+        match postcard::take_from_bytes(self.0) {
+            Ok((message, [])) => Ok(message),
+            _ => Err(FrameError::Broken),
+        }
+    }
+
+    /// The step, where the message is a [`Request::Step`](crate::Request::Step). A request has room for a configuration, and is
+    /// copied from hand to hand; nearly all are steps, which are small.
+    pub fn step(self) -> Option<Measured> {
+        match self.message() {
+            Ok(Kind::Step(step)) => Some(step),
+            _ => None,
+        }
+    }
+}
+
+/// The kinds of [`Request`](crate::Request), in its order.
+#[derive(Deserialize)]
+enum Kind {
+    Hello,
+    Configure,
+    Step(Measured),
+    Stop,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Hello, Request};
+
+    /// What is written as the bytes come is what copies would make of them, at every length about a separator's.
+    #[test]
+    fn a_frame_is_checksum_and_separators_one_after_the_other() {
+        for length in (0..8).chain(240..264).chain(500..520) {
+            let message = heapless::Vec::<u8, 600>::from_iter((0..length).map(|i| (i % 5) as u8));
+            let mut buffer = [7; LONGEST];
+            let found = encode(&message, &mut buffer).map(|length| &buffer[..length]);
+            let (mut plain, mut expected) = ([0; MESSAGE], [0; LONGEST]);
+            let plain = postcard::to_slice_crc32(&message, &mut plain, SUM.digest());
+            let length = plain.map(|plain| cobs::encode(plain, &mut expected));
+            let length = length.unwrap_or(0);
+            assert_eq!(found, Ok(&expected[..=length]));
+        }
+    }
+
+    #[test]
+    fn a_step_is_found_and_nothing_else_is_one() {
+        let list = |values: &[f32]| values.iter().copied().collect();
+        let step = Measured {
+            session: 7,
+            tick: 300,
+            age_us: 0,
+            supply: 12.0,
+            measured: list(&[0.1, -2.0]),
+            reference: list(&[0.2, 0.0]),
+        };
+        let hello = Hello {
+            version: 1,
+            session: 7,
+        };
+        for (request, expected) in [
+            (Request::Step(step.clone()), Some(step)),
+            (Request::Hello(hello), None),
+            (Request::Stop { session: 7 }, None),
+        ] {
+            let (mut buffer, mut decoder) = ([0; LONGEST], Decoder::default());
+            let length = encode(&request, &mut buffer).unwrap_or(0);
+            let mut ends = 0;
+            for byte in &buffer[..length] {
+                if let Some(Ok(frame)) = decoder.whole(*byte) {
+                    assert_eq!(frame.step(), expected);
+                    assert_eq!(frame.message(), Ok(request.clone()));
+                    ends += 1;
+                }
+            }
+            assert_eq!(ends, 1);
+        }
     }
 }

@@ -68,7 +68,7 @@ pub use configuration::{
     Attachment, CHANNELS, Configuration, ControllerGains, EFFECTS, Learning, NAME, PARAMETERS,
     SIGNALS, Safety,
 };
-pub use frame::{Decoder, FrameError, LONGEST, MESSAGE, encode};
+pub use frame::{Decoder, Frame, FrameError, LONGEST, MESSAGE, encode};
 pub use message::{Act, Hello, Measured, Note, Reply, Request, Sensed, Signals, Values, Welcome};
 pub use reason::{Reason, Unusable};
 

@@ -202,7 +202,7 @@ impl<const N: usize> Real for DualOf<N> {
         (self.chain(sin, cos), self.chain(cos, -sin))
     }
     fn tanh(self) -> Self {
-        let tanh = libm::tanh(self.value);
+        let tanh = Real::tanh(self.value);
         self.chain(tanh, 1.0 - tanh * tanh)
     }
     fn exp(self) -> Self {

@@ -2,7 +2,7 @@
 
 use loopsight_core::{Array, Plant};
 use loopsight_link::{
-    Act, Configuration, Decoder, Hello, Measured, Note, PARAMETERS, Reason, Reply, Request,
+    Act, Configuration, Decoder, Frame, Hello, Measured, Note, PARAMETERS, Reason, Reply, Request,
     SIGNALS, Sensed, Unusable, VERSION, Welcome,
 };
 
@@ -119,10 +119,15 @@ impl<R: Parts<Scalar = f32>, M: Meter> Session<R, M> {
     /// Takes one byte of the line. Broken frames are counted and not answered: the host notices that no
     /// answer comes.
     pub fn take(&mut self, byte: u8, say: &mut dyn FnMut(&Reply)) {
-        match self.decoder.take::<Request>(byte) {
-            Some(Ok(request)) => self.answer(request, say),
-            Some(Err(_)) => self.dropped = self.dropped.saturating_add(1),
-            None => {}
+        let Some(whole) = self.decoder.whole(byte) else {
+            return;
+        };
+        if let Some(step) = whole.ok().and_then(Frame::step) {
+            return self.told(step.session, say, |this, say| this.step(&step, say));
+        }
+        match whole.and_then(Frame::message) {
+            Ok(request) => self.answer(request, say),
+            Err(_) => self.dropped = self.dropped.saturating_add(1),
         }
     }
 
@@ -188,20 +193,35 @@ impl<R: Parts<Scalar = f32>, M: Meter> Session<R, M> {
         });
     }
 
+    /// A function of its own: a request is as large as a configuration, and steps have no use for that.
+    #[inline(never)]
     fn answer(&mut self, request: Request, say: &mut dyn FnMut(&Reply)) {
-        let session = match &request {
-            Request::Hello(hello) => return self.greet(*hello, say),
-            Request::Configure { session, .. } | Request::Stop { session } => *session,
-            Request::Step(step) => step.session,
-        };
-        if !self.greeted || session != self.session {
-            return self.rest(Reason::OtherSession, say);
+        match request {
+            Request::Hello(hello) => self.greet(hello, say),
+            Request::Configure {
+                session,
+                configuration,
+            } => self.told(session, say, |this, say| {
+                this.configure(&configuration, say)
+            }),
+            Request::Step(step) => {
+                self.told(step.session, say, |this, say| this.step(&step, say));
+            }
+            Request::Stop { session } => self.told(session, say, |_, _| Err(Reason::Asked)),
         }
-        let done = match request {
-            Request::Configure { configuration, .. } => self.configure(&configuration, say),
-            Request::Step(step) => self.step(&step, say),
-            Request::Stop { .. } => Err(Reason::Asked),
-            Request::Hello(_) => Ok(()),
+    }
+
+    /// Does what a message of this `session` asks for, or comes to rest.
+    fn told(
+        &mut self,
+        session: u32,
+        say: &mut dyn FnMut(&Reply),
+        ask: impl FnOnce(&mut Self, &mut dyn FnMut(&Reply)) -> Result<(), Reason>,
+    ) {
+        let done = if self.greeted && session == self.session {
+            ask(self, say)
+        } else {
+            Err(Reason::OtherSession)
         };
         if let Err(reason) = done {
             self.rest(reason, say);

@@ -10,7 +10,7 @@ use super::tree::{Slot, Tree};
 use super::{ExpressionError, Names, placed};
 use crate::config::{Mistake, PathSegment};
 use crate::{Dual, NarrowDual, TinyDual};
-use loopsight_core::{Dynamics, Real, rk4_step};
+use loopsight_core::{Dynamics, Real, Steps, rk4_step};
 
 const PARAMETERS: u8 = FIRST_BANK;
 const STATES: u8 = FIRST_BANK + 1;
@@ -305,21 +305,24 @@ macro_rules! dynamics {
                 self.rates.run(&[p, x, u, w], dx);
             }
 
-            fn step(
+            fn steps(
                 &self,
                 x: &mut [$scalar],
-                h: $scalar,
+                span: Steps<$scalar>,
                 u: &[$scalar],
                 w: &[$scalar],
                 p: &[$scalar],
             ) {
-                match x.len() {
-                    0..=2 => self.step_in::<$scalar, 2>(x, h, u, w, p),
-                    3..=4 => self.step_in::<$scalar, 4>(x, h, u, w, p),
-                    5..=6 => self.step_in::<$scalar, 6>(x, h, u, w, p),
-                    7..=8 => self.step_in::<$scalar, 8>(x, h, u, w, p),
-                    9..=16 => self.step_in::<$scalar, 16>(x, h, u, w, p),
-                    _ => self.step_in::<$scalar, MOST>(x, h, u, w, p),
+                let h = span.length;
+                for _ in 0..span.count {
+                    match x.len() {
+                        0..=2 => self.step_in::<$scalar, 2>(x, h, u, w, p),
+                        3..=4 => self.step_in::<$scalar, 4>(x, h, u, w, p),
+                        5..=6 => self.step_in::<$scalar, 6>(x, h, u, w, p),
+                        7..=8 => self.step_in::<$scalar, 8>(x, h, u, w, p),
+                        9..=16 => self.step_in::<$scalar, 16>(x, h, u, w, p),
+                        _ => self.step_in::<$scalar, MOST>(x, h, u, w, p),
+                    }
                 }
             }
 

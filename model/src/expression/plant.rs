@@ -9,7 +9,7 @@ use super::keep::{self, Kept};
 use super::table::{Ordered, ParameterTable, check_name, check_unit};
 use crate::config::{Mistake, PathSegment, nearest};
 use crate::registry::{AnyDynamics, PlantPart, ReadyPlant, Values};
-use loopsight_core::{Channel, Dynamics, Parameter, Place, PlantMeta, Real, Signal};
+use loopsight_core::{Channel, Dynamics, Parameter, Place, PlantMeta, Real, Signal, Steps};
 
 /// `[plant.expression]`, as written.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -339,7 +339,7 @@ struct Nothing;
 
 impl<S: Real> Dynamics<S> for Nothing {
     fn derivative(&self, _x: &[S], _u: &[S], _w: &[S], _p: &[S], _dx: &mut [S]) {}
-    fn step(&self, _x: &mut [S], _h: S, _u: &[S], _w: &[S], _p: &[S]) {}
+    fn steps(&self, _x: &mut [S], _span: Steps<S>, _u: &[S], _w: &[S], _p: &[S]) {}
     fn output(&self, _index: usize, _x: &[S], _u: &[S], _p: &[S]) -> S {
         S::zero()
     }

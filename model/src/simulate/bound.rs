@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::model::Model;
 use crate::registry::{AnyPhysics, HostReal};
-use loopsight_core::{Channel, Past, Place, Reading, Role};
+use loopsight_core::{Channel, Now, Past, Place, Reading, Role, Spot};
 
 /// An effect at one channel.
 #[derive(Clone)]
@@ -118,14 +118,6 @@ impl Bounds {
             .chain(&self.output_memory)
     }
 
-    /// Whether nothing acts within an integration step.
-    pub(crate) fn idle(&self) -> bool {
-        self.inputs.is_empty()
-            && self.efforts.is_empty()
-            && self.bodies.is_empty()
-            && self.outputs.iter().all(|b| b.n_z == 0)
-    }
-
     /// Signals that effects acting within a step read.
     pub(crate) fn read(&self) -> impl Iterator<Item = usize> + '_ {
         self.input_memory
@@ -140,6 +132,53 @@ impl Bounds {
     /// Signals that any effect reads.
     pub(crate) fn shown(&self) -> impl Iterator<Item = usize> + '_ {
         self.all().flat_map(Bound::signals)
+    }
+}
+
+/// One effect at all its channels of one kind of place.
+#[derive(Clone)]
+pub(super) struct Group {
+    physics: &'static dyn AnyPhysics,
+    parameters: Range<usize>,
+    spots: Vec<Spot>,
+}
+
+impl Group {
+    /// The effects of `bounds`, which are without memory, in their order. Their states are counted from `first`.
+    pub(super) fn of(bounds: &[Bound], first: usize) -> Vec<Self> {
+        let of_one = bounds.chunk_by(|a, b| a.effect == b.effect);
+        let group = |of_one: &[Bound]| {
+            let effect = of_one.first()?;
+            let spot = |bound: &Bound| Spot {
+                to: match bound.place {
+                    Place::Input(i) | Place::Output(i) | Place::Effort(i) | Place::Rate(i) => i,
+                },
+                side: bound.side,
+                is_position: bound.is_position,
+                reads: bound.reads,
+                z: bound.z - first..bound.z - first + bound.n_z,
+            };
+            Some(Self {
+                physics: effect.physics,
+                parameters: effect.parameters.clone(),
+                spots: of_one.iter().map(spot).collect(),
+            })
+        };
+        of_one.filter_map(group).collect()
+    }
+
+    /// Adds what the effect contributes to `to`, and puts the rates of its states into `dz`. `values` are those of the
+    /// whole model.
+    #[inline(always)]
+    pub(super) fn act<S: HostReal>(
+        &self,
+        now: &Now<'_, S>,
+        values: &[S],
+        to: &mut [S],
+        dz: &mut [S],
+    ) {
+        let p = &values[self.parameters.clone()];
+        S::physics(self.physics).act(&self.spots, now, p, to, dz);
     }
 }
 

@@ -149,7 +149,7 @@ impl<S: HostReal> Simulator<'_, S> {
             if !*linearised {
                 self.apply(input, 0.0);
                 self.way = Way::Linearise;
-                self.step(self.time, h);
+                self.step(self.time, h, 1);
                 *linearised = true;
             }
             self.implicit.prepare(h);
@@ -185,7 +185,7 @@ impl<S: HostReal> Simulator<'_, S> {
         self.way = Way::Linearise;
         // What an input does later is no part of it, and nothing is to be remembered.
         let slopes = std::mem::take(&mut self.slopes);
-        self.step(self.time + elapsed, 0.0);
+        self.step(self.time + elapsed, 0.0, 1);
         self.slopes = slopes;
         self.implicit.fastest()
     }

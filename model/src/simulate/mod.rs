@@ -31,6 +31,7 @@ use lengthen::Lengthened;
 use push::Pushed;
 use sensing::{Integral, Sensing, sense};
 pub use state_observer::StateObserver;
+use step::Plan;
 use stiff::{Implicit, Way};
 
 /// Integrates a model through time.
@@ -47,6 +48,7 @@ pub struct Simulator<'m, S> {
     p: Vec<S>,
     values: Vec<S>,
     bounds: Bounds,
+    plan: Plan,
     sensors: Vec<Sensing>,
     histories: Vec<History<S>>,
     rk4: Rk4<Vec<S>>,
@@ -190,6 +192,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             fresh: false,
             trail: true,
             sensors,
+            plan: Plan::of(&bounds, nx, size),
             bounds,
             time: 0.0,
             interval: 0.0,
@@ -362,11 +365,16 @@ impl<'m, S: HostReal> Simulator<'m, S> {
     fn integrate(&mut self, input: &[f64], span: f64, steps: usize, remember: bool) {
         let start = self.time;
         let h = span / steps as f64;
+        let remember = remember && !self.bounds.output_memory.is_empty();
+        if !remember && self.is_even() {
+            self.apply(input, 0.0);
+            return self.step(start, h, steps);
+        }
         for step in 0..steps {
             let elapsed = h * step as f64;
             self.apply(input, elapsed);
-            self.step(start + elapsed, h);
-            if remember && !self.bounds.output_memory.is_empty() {
+            self.step(start + elapsed, h, 1);
+            if remember {
                 self.time = start + h * (step + 1) as f64;
                 self.refresh();
                 self.remember();

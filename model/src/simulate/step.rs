@@ -1,23 +1,61 @@
-//! One integration step: what acts on the plant, and by which method it moves.
+//! Integration steps: what acts on the plant, and by which method it moves.
 
-use super::bound::Scene;
+use super::bound::{Bounds, Group, Scene};
 use super::ramp::{hold_means, ramped};
 use super::sensing::Integral;
 use super::stiff::Way;
 use super::{Scratch, Simulator};
 use crate::model::Model;
 use crate::registry::HostReal;
-use loopsight_core::{NoPast, Place};
+use loopsight_core::{NoPast, Now, Place, Steps, Under};
+
+/// Where the stages of a step lie, as parts of it.
+const PARTS: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
+
+/// The effects that act within a step, in the order in which they do.
+#[derive(Clone)]
+pub(super) struct Plan {
+    inputs: Vec<Group>,
+    efforts: Vec<Group>,
+    bodies: Vec<Group>,
+    /// Something acts on the plant that its own steps do not offer: it is not efforts alone, or has states.
+    beside: bool,
+    /// Nothing acts within a step, nor on the inputs before it.
+    alone: bool,
+}
+
+impl Plan {
+    /// Of the effects of a model with so many states, beside which others may be integrated, `size` in all.
+    pub(super) fn of(bounds: &Bounds, states: usize, size: usize) -> Self {
+        Self {
+            inputs: Group::of(&bounds.inputs, states),
+            efforts: Group::of(&bounds.efforts, states),
+            bodies: Group::of(&bounds.bodies, states),
+            beside: !bounds.inputs.is_empty() || !bounds.bodies.is_empty() || size > states,
+            alone: bounds.efforts.is_empty(),
+        }
+    }
+}
 
 impl<S: HostReal> Simulator<'_, S> {
-    /// One integration step, from the inputs in `held`; leaves those at its end there.
-    pub(super) fn step(&mut self, from: f64, h: f64) {
+    /// Whether the steps of an interval differ in nothing but where they begin: the inputs are constant over it, for every
+    /// effect.
+    pub(super) fn is_even(&self) -> bool {
+        self.way == Way::Explicit
+            && self.bounds.input_memory.is_empty()
+            && self.slopes.iter().all(|slope| *slope == 0.0)
+    }
+
+    /// So many integration `steps` of `h` seconds, from the inputs in `held`; leaves those at their end there. More than
+    /// one where the interval [is even](Self::is_even).
+    pub(super) fn step(&mut self, from: f64, h: f64, steps: usize) {
         self.fresh = false;
         let Self {
             model,
             p,
             values,
             bounds,
+            plan,
             sensors,
             histories,
             rk4,
@@ -64,127 +102,140 @@ impl<S: HostReal> Simulator<'_, S> {
         scratch.w.copy_from_slice(&pushed.efforts);
         let (nx, nu) = (model.n_states(), model.plant.inputs.len());
         let dynamics = S::dynamics(model.dynamics);
-        let plain = bounds.idle() && x.len() == nx && pushed.rates.is_empty() && !ramping;
-        if plain && *way == Way::Explicit {
-            // Nothing changes what acts on the plant within the step: half the time.
-            let (h, held, w) = (S::of(h), &scratch.held, &scratch.w);
-            if *trail {
-                dynamics.step(x, h, held, w, p);
-            } else {
-                dynamics.step_motion(x, h, held, w, p);
-            }
-            return;
-        }
         let Scratch {
             held,
             u,
             w,
             signals,
         } = scratch;
-        let changing = ramping || !bounds.inputs.is_empty();
-        let rates = |stage: usize, x: &[S], dx: &mut [S]| {
-            let time = from + h * [0.0, 0.5, 0.5, 1.0][stage];
-            let plant_x = &x[..nx];
-            let u: &mut [S] = if changing {
-                u.copy_from_slice(held);
-                u
-            } else {
-                held
+        if *way == Way::Explicit && !plan.beside && pushed.rates.is_empty() && !ramping {
+            let span = Steps {
+                count: steps,
+                length: S::of(h),
             };
-            if ramping {
-                ramped(u, bounds, slopes, time - from);
+            if plan.alone {
+                if *trail {
+                    dynamics.steps(x, span, held, w, p);
+                } else {
+                    dynamics.steps_of_motion(x, span, held, w, p);
+                }
+                return;
             }
-            for i in &needed.states {
-                signals[*i] = plant_x[*i];
+            let under = Under {
+                span,
+                u: held,
+                w,
+                p,
+                states: &needed.states,
+                outputs: &needed.outputs,
+                trail: *trail,
+            };
+            let mut act = |(step, stage): (usize, usize), signals: &[S], w: &mut [S]| {
+                let now = Now {
+                    time: (from + h * step as f64) + h * PARTS[stage],
+                    signals,
+                    z: &[],
+                };
+                for group in &plan.efforts {
+                    group.act(&now, values, w, &mut []);
+                }
+            };
+            if dynamics.steps_under(x, &under, signals, &mut act) {
+                return;
             }
-            let refresh = |u: &[S], signals: &mut [S]| {
-                for i in &needed.inputs {
-                    signals[nx + i] = u[*i];
+        }
+        let changing = ramping || !plan.inputs.is_empty();
+        for step in 0..steps {
+            let from = from + h * step as f64;
+            let rates = |stage: usize, x: &[S], dx: &mut [S]| {
+                let time = from + h * PARTS[stage];
+                let (plant_x, z) = x.split_at(nx);
+                let (plant_dx, dz) = dx.split_at_mut(nx);
+                let u: &mut [S] = if changing {
+                    u.copy_from_slice(held);
+                    u
+                } else {
+                    held
+                };
+                if ramping {
+                    ramped(u, bounds, slopes, time - from);
                 }
-                if !needed.outputs.is_empty() {
-                    dynamics.outputs(&needed.outputs, plant_x, u, p, &mut signals[nx + nu..]);
+                for i in &needed.states {
+                    signals[*i] = plant_x[*i];
                 }
-            };
-            refresh(u, signals);
-            let now = Scene {
-                values,
-                x,
-                signals: &[],
-                time,
-                interval: (time, time),
-            };
-            if !bounds.inputs.is_empty() {
-                let scene = Scene { signals, ..now };
-                for bound in &bounds.inputs {
-                    let Place::Input(i) = bound.place else {
-                        continue;
-                    };
-                    scene.rates(bound, u[i], &NoPast, dx);
-                    let add = scene.contribution(bound, u[i], &NoPast);
-                    u[i] += add;
-                }
+                let refresh = |u: &[S], signals: &mut [S]| {
+                    for i in &needed.inputs {
+                        signals[nx + i] = u[*i];
+                    }
+                    if !needed.outputs.is_empty() {
+                        dynamics.outputs(&needed.outputs, plant_x, u, p, &mut signals[nx + nu..]);
+                    }
+                };
                 refresh(u, signals);
-            }
-            let scene = Scene { signals, ..now };
-            if !bounds.efforts.is_empty() {
-                w.copy_from_slice(&pushed.efforts);
-                for bound in &bounds.efforts {
-                    let Place::Effort(i) = bound.place else {
-                        continue;
-                    };
-                    scene.rates(bound, w[i], &NoPast, dx);
-                    let add = scene.contribution(bound, w[i], &NoPast);
-                    w[i] += add;
+                if !plan.inputs.is_empty() {
+                    let now = Now { time, signals, z };
+                    for group in &plan.inputs {
+                        group.act(&now, values, u, dz);
+                    }
+                    refresh(u, signals);
                 }
-            }
-            let dx_of_plant = &mut dx[..nx];
-            if *trail {
-                dynamics.derivative(plant_x, u, w, p, dx_of_plant);
-            } else {
-                dynamics.motion(plant_x, u, w, p, dx_of_plant);
-            }
-            for (rate, push) in dx.iter_mut().zip(&pushed.rates) {
-                *rate += *push;
-            }
-            for bound in &bounds.bodies {
-                let Place::Rate(i) = bound.place else {
-                    continue;
-                };
-                let nominal = dx[i];
-                scene.rates(bound, nominal, &NoPast, dx);
-                dx[i] += scene.contribution(bound, nominal, &NoPast);
-            }
-            for bound in bounds.outputs.iter().filter(|b| b.n_z > 0) {
-                let Place::Output(i) = bound.place else {
-                    continue;
-                };
-                scene.rates(bound, signals[i], &NoPast, dx);
-            }
-            for sensor in sensors.iter() {
-                let Integral::State(to) = sensor.integral else {
-                    continue;
-                };
-                let mut value = signals[sensor.index];
-                for bound in &bounds.outputs {
-                    if bound.place == Place::Output(sensor.index) {
-                        value += scene.contribution(bound, value, &NoPast);
+                let now = Now { time, signals, z };
+                if !plan.efforts.is_empty() {
+                    w.copy_from_slice(&pushed.efforts);
+                    for group in &plan.efforts {
+                        group.act(&now, values, w, dz);
                     }
                 }
-                dx[to] = value;
+                if *trail {
+                    dynamics.derivative(plant_x, u, w, p, plant_dx);
+                } else {
+                    dynamics.motion(plant_x, u, w, p, plant_dx);
+                }
+                for (rate, push) in plant_dx.iter_mut().zip(&pushed.rates) {
+                    *rate += *push;
+                }
+                for group in &plan.bodies {
+                    group.act(&now, values, plant_dx, dz);
+                }
+                let scene = Scene {
+                    values,
+                    x,
+                    signals,
+                    time,
+                    interval: (time, time),
+                };
+                for bound in bounds.outputs.iter().filter(|b| b.n_z > 0) {
+                    let Place::Output(i) = bound.place else {
+                        continue;
+                    };
+                    scene.rates(bound, signals[i], &NoPast, dx);
+                }
+                for sensor in sensors.iter() {
+                    let Integral::State(to) = sensor.integral else {
+                        continue;
+                    };
+                    let mut value = signals[sensor.index];
+                    for bound in &bounds.outputs {
+                        if bound.place == Place::Output(sensor.index) {
+                            value += scene.contribution(bound, value, &NoPast);
+                        }
+                    }
+                    dx[to] = value;
+                }
+            };
+            match way {
+                Way::Explicit => rk4.step(x, S::of(h), rates),
+                Way::Implicit => implicit.step(x, h, rates),
+                Way::Linearise => implicit.linearise(x, rates),
             }
-        };
-        match way {
-            Way::Explicit => rk4.step(x, S::of(h), rates),
-            Way::Implicit => implicit.step(x, h, rates),
-            Way::Linearise => implicit.linearise(x, rates),
-        }
-        if bounds.states > 0 {
-            for bound in bounds.all() {
-                Scene::confine(values, bound, x);
+            if bounds.states > 0 {
+                for bound in bounds.all() {
+                    Scene::confine(values, bound, x);
+                }
             }
-        }
-        if ramping {
-            ramped(held, bounds, slopes, h);
+            if ramping {
+                ramped(held, bounds, slopes, h);
+            }
         }
     }
 }

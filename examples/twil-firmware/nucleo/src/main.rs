@@ -77,8 +77,9 @@ fn main() -> ! {
     let mut hangs = IndependentWatchdog::new(chip.IWDG);
     hangs.start(HANGS_MS.millis());
 
+    // Cleared once: each message writes over what it needs.
+    let mut buffer = [0; LONGEST];
     let mut say = |reply: &Reply| {
-        let mut buffer = [0; LONGEST];
         // Every message fits (a test of `loopsight-link`); one that did not would be noticed as lost.
         if let Ok(length) = encode(reply, &mut buffer) {
             line::send(&buffer[..length]);
