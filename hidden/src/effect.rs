@@ -88,6 +88,7 @@ effects! {
     ElasticCoupling "elastic_coupling" Axis "a part of the inertia behind a long shaft; the encoder sits at the motor",
     SensorDelay "sensor_delay" Twil "odometry that is read late",
     SensorLag "sensor_lag" Twil "odometry from filtered counts",
+    SensorWindow "sensor_window" Twil "speeds that are moving means of differences of counts",
     SensorOffset "sensor_offset" Twil "a bias on the measured yaw rate",
     SensorScale "sensor_scale" Twil "a wrong scale on the measured forward speed",
     WheelRadiusMismatch "wheel_radius_mismatch" Twil "measuring wheels, undriven, the right one larger and the left one smaller than odometry believes",

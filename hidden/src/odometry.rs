@@ -1,5 +1,6 @@
 //! Encoders, and the velocities that are made of their counts.
 
+use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use crate::delay::Delay;
@@ -26,7 +27,7 @@ pub(crate) struct Eccentricity {
 /// y_j(t_k) = scale_j Σ_i gain_ji Δ (N_i(t_k - d) - N_i(t_k-1 - d))/T + offset_j
 /// ```
 ///
-/// With a lag the counts pass a first-order filter, whose output is in whole counts, too. With one track `N` is the
+/// With a window of `n` differences more it is `(N_i(t_k) - N_i(t_k-1-n))/((1 + n) T)`: the mean of so many. With a lag the counts pass a first-order filter, whose output is in whole counts, too. With one track `N` is the
 /// number of marks that have passed, whichever way, and the angle is the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct OdometryParts {
@@ -38,6 +39,8 @@ pub(crate) struct OdometryParts {
     pub(crate) delay: f64,
     /// Time constant of the filter, s.
     pub(crate) lag: f64,
+    /// Differences before the last one of which the mean is given out.
+    pub(crate) window: usize,
     /// Offset of each signal.
     pub(crate) offset: [f64; 2],
     /// Scale of each signal.
@@ -66,6 +69,7 @@ impl OdometryParts {
             gain,
             delay: 0.0,
             lag: 0.0,
+            window: 0,
             offset: [0.0; 2],
             scale: [1.0; 2],
             wheel_size: [1.0; 2],
@@ -93,7 +97,8 @@ pub(crate) struct Odometry {
     /// What remains of a difference after one step of the filter; 0 without filter.
     decay: f64,
     now: Reading,
-    last: Reading,
+    /// At the samples before this one, the oldest first.
+    last: VecDeque<Reading>,
     /// What the discs were at after the last step.
     seen: Reading,
     /// Every step counts, not only those at which a sample is taken.
@@ -114,12 +119,12 @@ impl Odometry {
             line: Delay::new((parts.delay / step).round() as usize, [0.0; 2]),
             decay,
             now: Reading::default(),
-            last: Reading::default(),
+            last: VecDeque::new(),
             seen: Reading::default(),
             every_step: parts.delay > 0.0 || parts.lag > 0.0 || parts.one_track,
         };
         odometry.now = odometry.read([0.0; 2]);
-        odometry.last = odometry.now;
+        odometry.last = vec![odometry.now; 1 + parts.window].into();
         odometry.seen = odometry.now;
         odometry
     }
@@ -166,8 +171,10 @@ impl Odometry {
 
     /// The signals over the last `period` s: as counted, and as they would be without counting.
     pub(crate) fn sample(&mut self, period: f64) -> ([f64; 2], [f64; 2]) {
+        let last = self.last.pop_front().unwrap_or(self.now);
+        let span = (1 + self.parts.window) as f64;
         let rate = |now: [f64; 2], last: [f64; 2]| {
-            let [right, left] = [0, 1].map(|i| (now[i] - last[i]) / period);
+            let [right, left] = [0, 1].map(|i| (now[i] - last[i]) / (span * period));
             [0, 1].map(|j| {
                 let gain = self.parts.gain[j];
                 self.parts.scale[j] * (gain[0] * right + gain[1] * left) + self.parts.offset[j]
@@ -179,9 +186,9 @@ impl Odometry {
         } else {
             self.now.output = self.now.counted;
         }
-        let counted = rate(self.now.output, self.last.output);
-        let exact = rate(self.now.exact, self.last.exact);
-        self.last = self.now;
+        let counted = rate(self.now.output, last.output);
+        let exact = rate(self.now.exact, last.exact);
+        self.last.push_back(self.now);
         (counted, exact)
     }
 }
@@ -228,12 +235,15 @@ mod tests {
     }
 
     #[test]
-    fn delay_and_lag_are_late_by_their_time() {
+    fn delay_lag_and_window_are_late_by_their_time() {
         let mut late = parts();
         late.delay = 0.03;
         let mut slow = parts();
         slow.lag = 0.03;
-        for parts in [late, slow] {
+        // A mean of seven differences is late by three periods more than one.
+        let mut mean = parts();
+        mean.window = 6;
+        for parts in [late, slow, mean] {
             let mut odometry = Odometry::new(parts, [0.0; 2], 1e-4);
             // A ramp of speed: the mean over a period is late by half of it, too.
             let mut v = [0.0; 2];

@@ -263,6 +263,7 @@ fn the_committed_recordings_are_these() {
         (Robot::TankPair, Hidden::Overflow),
         (Robot::Axis, Hidden::EndStop),
         (Robot::Arm, Hidden::EndStop),
+        (Robot::Twil, Hidden::SensorWindow),
     ] {
         let lesson = robot.lesson(Some(effect));
         record(robot, &[(effect, 1.0)], lesson, 1)

@@ -70,6 +70,7 @@ pub(crate) fn hide(
         H::WindingHeating => input::heating(machine, concealed),
         H::SensorDelay => output::delay(machine, concealed),
         H::SensorLag => output::lag(machine, concealed),
+        H::SensorWindow => output::window(machine, concealed),
         H::SensorOffset => output::offset(machine, concealed),
         H::SensorScale => output::scale(machine, concealed),
         H::WheelRadiusMismatch => output::radius(machine, concealed),

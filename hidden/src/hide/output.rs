@@ -1,6 +1,7 @@
 //! Effects between the motion and the number in the log.
 
 use crate::driven::Driven;
+use crate::experiment::PERIOD;
 use crate::odometry::Eccentricity;
 use crate::physics::Physics;
 use crate::truth::Concealed;
@@ -26,6 +27,14 @@ pub(super) fn lag(m: &mut Physics, mut of: Concealed) -> Concealed {
     let lag = 0.04 * of.size;
     m.odometry.lag = lag;
     of.fitted("lag", lag, "s")
+}
+
+/// Speeds that are means of five differences of counts: a window of 40 ms before the last one.
+pub(super) fn window(m: &mut Physics, mut of: Concealed) -> Concealed {
+    at_sensors(m, &mut of);
+    let periods = (0.04 * of.size / PERIOD).round().max(1.0);
+    m.odometry.window = periods as usize;
+    of.fitted("window", periods * PERIOD, "s")
 }
 
 /// 0.1 rad/s on the yaw rate; on the axis 0.25 rad/s.
