@@ -16,13 +16,31 @@ use crate::progress::{Cancelled, Work};
 /// Excursions to an end from which their turns are told from chance.
 const SEVERAL: usize = 3;
 
-/// Values before the lower and the upper end of where a signal goes, where it stays at one of them or turns round there
-/// again and again: hardly before it, and where a stop that gives may begin. Of a signal that the log does not show, values
-/// within where the free run goes.
+/// The lower and the upper end of where a signal goes, where it stays at one of them or turns round there again and again.
 ///
 /// What has a stop at one end may have come to the one at the other end too seldom to be seen. A fit begins before both
 /// then, and lets a limit go that nothing came to ([`crate::candidates::Candidate::without_unmet`]).
-pub(crate) type Ends = [Option<[f64; 2]>; 2];
+pub(crate) type Ends = [Option<End>; 2];
+
+/// An end of where a signal goes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct End {
+    /// Where a fit of a limit begins: hardly before the end, and where a stop that gives may begin. Of a signal that the log
+    /// does not show, values within where the free run goes.
+    pub(crate) starts: [f64; 2],
+    /// The last value.
+    last: f64,
+    /// From one end to the other; without end for a signal that the log does not show.
+    range: f64,
+}
+
+impl End {
+    /// How much of the way lies between a `limit` and this end.
+    pub(crate) fn share_beyond(&self, limit: f64) -> f64 {
+        let [hardly, _] = self.starts;
+        ((self.last - limit) * (self.last - hardly).signum()).max(0.0) / self.range
+    }
+}
 
 /// Where a fit of a limit starts, in widths of an end before it: a stop that gives nothing, and one that gives much.
 const STARTS: [f64; 2] = [0.1, 0.8];
@@ -71,7 +89,13 @@ pub(crate) fn ends(
                 STARTS.map(|share| share * criteria.end)
             };
             let of = |sign| signs.contains(&sign).then(|| before(&tracks, sign, shares));
-            found[index] = [-1.0, 1.0].map(|sign| of(sign).flatten());
+            found[index] = [-1.0, 1.0].map(|sign| {
+                let mut end = of(sign).flatten()?;
+                if unseen {
+                    end.range = f64::INFINITY;
+                }
+                Some(end)
+            });
         }
     }
     Ok(found)
@@ -126,13 +150,17 @@ fn track(model: &Model, index: usize, path: &[Vec<f64>], run: &Run) -> Vec<f64> 
     }
 }
 
-/// Values before the end of these tracks by some shares of their range, the upper end where `sign` is 1 and the lower one
-/// where it is -1. None of what stands still.
-fn before(tracks: &[Vec<f64>], sign: f64, shares: [f64; 2]) -> Option<[f64; 2]> {
+/// The end of these tracks, the upper one where `sign` is 1 and the lower one where it is -1, with starts before it by some
+/// shares of their range. None of what stands still.
+fn before(tracks: &[Vec<f64>], sign: f64, shares: [f64; 2]) -> Option<End> {
     let [low, high] = extent(tracks, sign);
     let range = high - low;
     let normal = range.is_normal();
-    normal.then(|| shares.map(|share| sign * (high - share * range)))
+    normal.then(|| End {
+        starts: shares.map(|share| sign * (high - share * range)),
+        last: sign * high,
+        range,
+    })
 }
 
 /// The least and the greatest value of `sign` times these tracks.
@@ -231,8 +259,16 @@ mod tests {
             .map(|k| wander(0.01 * f64::from(k)).min(0.5))
             .collect();
         let shares = STARTS.map(|share| share * SearchCriteria::DEFAULT.end);
-        let start = before(&[track], 1.0, shares).unwrap();
-        assert!(start.iter().all(|x| (0.3..0.5).contains(x)), "{start:?}");
+        let end = before(std::slice::from_ref(&track), 1.0, shares).unwrap();
+        let starts = end.starts;
+        assert!(starts.iter().all(|x| (0.3..0.5).contains(x)), "{starts:?}");
+        // Of the way from the lowest value up to 0.5.
+        let low = track.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!((end.share_beyond(0.5 * (low + 0.5)) - 0.5).abs() < 1e-12);
+        assert_eq!(end.share_beyond(0.6), 0.0);
+        let end = before(&[track], -1.0, shares).unwrap();
+        assert!((end.share_beyond(0.5 * (low + 0.5)) - 0.5).abs() < 1e-12);
+        assert_eq!(end.share_beyond(low - 0.1), 0.0);
         assert!(before(&[vec![1.0; 9]], 1.0, shares).is_none());
     }
 }

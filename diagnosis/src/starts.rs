@@ -155,8 +155,8 @@ fn starts(
         let at_end = limits.and_then(|end| candidate.ends[end as usize]);
         let values: Vec<f64> = if let Some(value) = known.get(parameter.declaration.id) {
             vec![*value]
-        } else if let Some(values) = at_end {
-            values.map(nearest).to_vec()
+        } else if let Some(end) = at_end {
+            end.starts.map(nearest).to_vec()
         } else if !parameter.free && listed.is_empty() {
             vec![neutral]
         } else if parameter.free && parameter.declaration.unit == "flow" && candidate.flow > 0.0 {

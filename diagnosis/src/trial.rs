@@ -232,7 +232,8 @@ fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit
         return None;
     }
     let solution = problem.solution(&found);
-    if first.candidate.drowns(&solution.values, nominal.criteria()) {
+    let (values, criteria) = (&solution.values, nominal.criteria());
+    if first.candidate.drowns(values, criteria) || first.candidate.has_no_way(values, criteria) {
         return None;
     }
     let fit = problem.result(&found).ok()?;

@@ -2,6 +2,8 @@
 
 use loopsight_diagnosis::{Conclusion, EffectAt, Improvement, ImprovementStep, ParameterVerdict};
 
+use loopsight_model::model::Attached;
+
 use super::diagnosis::{self, Said};
 use super::number::{error, hundredths};
 use super::place::{enumerated, place, place_in_brackets, place_in_table};
@@ -45,19 +47,15 @@ pub fn said(improvement: &Improvement) -> Said {
             .map(|one| format!("{}{}", own(one), place_in_brackets(one)))
             .collect(),
     };
-    let mut because = vec![format!(
-        "With {} the free-run error falls from {} to {}, on data that the model was not fitted to.",
-        if names.len() == 1 { "it" } else { "them" },
-        error(first.nrmse_test),
-        error(end.nrmse_test)
-    )];
+    let with = if names.len() == 1 { "it" } else { "them" };
+    let mut because = vec![moved(with, first, end)];
     because.extend(
         improvement
             .steps
             .iter()
             .flat_map(|step| written(improvement, step)),
     );
-    because.push(rest(improvement.verdict, &error(last.floor.nrmse)));
+    because.push(rest(improvement.verdict, end.nrmse_test, last.floor.nrmse));
     because.extend((improvement.best.iter()).flat_map(|best| fit::not_shown(&best.model)));
     because.extend(
         last.observer
@@ -99,12 +97,42 @@ fn written(improvement: &Improvement, step: &ImprovementStep) -> Vec<String> {
         .collect()
 }
 
-/// What is still missing at the end.
-fn rest(verdict: Conclusion, floor: &str) -> String {
+/// How the error moved with what was added. An effect that acts where the runs start need not lower the error elsewhere.
+fn moved(with: &str, first: &ImprovementStep, end: &ImprovementStep) -> String {
+    let [before, after] = [first, end].map(|step| error(step.nrmse_test));
+    if end.nrmse_test < first.nrmse_test && before != after {
+        return format!(
+            "With {with} the free-run error falls from {before} to {after}, on data that the model was not fitted to."
+        );
+    }
+    let unseen = if before == after {
+        format!("stays at {after}")
+    } else {
+        format!("goes from {before} to {after}")
+    };
+    format!(
+        "With {with} the free-run error on the fitted data falls from {} to {}; on data that the model was not fitted to it \
+         {unseen}.",
+        error(first.nrmse_fit),
+        error(end.nrmse_fit)
+    )
+}
+
+/// What is still missing at the end, where the error is `left` and noise would leave the `floor`.
+fn rest(verdict: Conclusion, left: f64, floor: f64) -> String {
+    let below = left < floor;
+    let floor = error(floor);
     match verdict {
+        Conclusion::NothingMissing if below => format!(
+            "Nothing more is missing: that is no more than noise and resolution seem to leave, {floor}."
+        ),
         Conclusion::NothingMissing => {
             format!("Nothing more is missing: noise and resolution alone would leave {floor}.")
         }
+        Conclusion::UnknownEffect if below => format!(
+            "That is below what noise and resolution seem to leave, {floor}. But quantities of the model still predict it: \
+             something is still missing, and no effect of the library explains it."
+        ),
         Conclusion::UnknownEffect => format!(
             "Noise and resolution alone would leave {floor}: something is still missing, and no effect of the \
              library explains it."
@@ -122,22 +150,18 @@ fn rest(verdict: Conclusion, floor: &str) -> String {
 
 /// The effects that an improvement has added: those of the best model, where there is one.
 pub fn added(improvement: &Improvement) -> Vec<EffectAt> {
-    let before = improvement
-        .diagnoses
-        .first()
-        .and_then(|d| d.model.as_ref())
-        .map(|m| m.effects.len());
-    match (&improvement.best, before) {
-        (Some(best), Some(before)) => best
-            .model
-            .effects
-            .iter()
-            .skip(before)
-            .map(|effect| EffectAt {
-                effect: effect.meta.id.to_owned(),
-                at: effect.at.iter().map(|c| c.id.to_owned()).collect(),
-            })
-            .collect(),
+    let place = |effect: &Attached| EffectAt {
+        effect: effect.meta.id.to_owned(),
+        at: effect.at.iter().map(|c| c.id.to_owned()).collect(),
+    };
+    let first = improvement.diagnoses.first();
+    match (&improvement.best, first.and_then(|d| d.model.as_ref())) {
+        // One that contains an effect of the file takes its place: how many there are does not tell.
+        (Some(best), Some(before)) => {
+            let before: Vec<EffectAt> = before.effects.iter().map(place).collect();
+            let all = best.model.effects.iter().map(place);
+            all.filter(|effect| !before.contains(effect)).collect()
+        }
         _ => improvement
             .steps
             .iter()
@@ -215,4 +239,46 @@ pub fn text(improvement: &Improvement) -> String {
         text.push_str(&fit::found(best));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(nrmse_fit: f64, nrmse_test: f64) -> ImprovementStep {
+        ImprovementStep {
+            added: None,
+            entries: None,
+            round: 0,
+            nrmse_fit,
+            nrmse_test,
+            still_open: Vec::new(),
+        }
+    }
+
+    /// An error that does not fall is not said to.
+    #[test]
+    fn the_error_is_said_to_go_where_it_goes() {
+        let said = |fit: [f64; 2], test: [f64; 2]| {
+            moved("it", &step(fit[0], test[0]), &step(fit[1], test[1]))
+        };
+        let fell = said([0.2, 0.02], [0.3, 0.03]);
+        assert!(fell.contains("falls from 30.0 % to 3.00 %"), "{fell}");
+        let rose = said([0.0233, 0.0089], [0.00703, 0.00708]);
+        assert!(rose.contains("falls from 2.33 % to 0.89 %"), "{rose}");
+        assert!(rose.contains("goes from 0.70 % to 0.71 %"), "{rose}");
+        let stayed = said([0.0233, 0.0089], [0.00703, 0.00702]);
+        assert!(stayed.contains("stays at 0.70 %"), "{stayed}");
+    }
+
+    /// What is below the floor is not said to be above it.
+    #[test]
+    fn an_error_below_the_floor_is_said_to_be_there() {
+        for verdict in [Conclusion::NothingMissing, Conclusion::UnknownEffect] {
+            let below = rest(verdict, 0.017, 0.045);
+            assert!(!below.contains("alone would leave"), "{below}");
+            assert!(below.contains("4.50 %"), "{below}");
+            assert!(rest(verdict, 0.047, 0.045).contains("alone would leave"));
+        }
+    }
 }
