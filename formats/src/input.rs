@@ -251,12 +251,20 @@ impl Input {
     pub fn into_bytes(self) -> Result<Vec<u8>, FormatError> {
         match self.data {
             Data::Memory(cursor) => Ok(cursor.into_inner()),
-            Data::File(_) => {
-                let mut input = self;
-                input.rewind()?;
+            Data::File(reader) => {
+                let (name, len) = (self.name, self.len);
+                let io = |error: io::Error| FormatError::Io {
+                    path: name.clone().into(),
+                    message: error.to_string().into(),
+                };
+                // Past the buffer, into room for all of it: a large file is copied once.
+                let mut file = reader.into_inner();
+                file.rewind().map_err(io)?;
                 let mut bytes = Vec::new();
-                let read = input.read_to_end(&mut bytes);
-                read.map_err(|e| input.io(&e))?;
+                let room = usize::try_from(len).ok();
+                let room = room.and_then(|len| bytes.try_reserve_exact(len.checked_add(1)?).ok());
+                room.ok_or_else(|| io(io::ErrorKind::OutOfMemory.into()))?;
+                file.read_to_end(&mut bytes).map_err(io)?;
                 Ok(bytes)
             }
         }

@@ -7,8 +7,16 @@
 //! stand at the end of names, in brackets, or on a line of their own below the names. Without a header
 //! columns are called `column 1`, `column 2`.
 
+mod lines;
+mod quick;
+#[cfg(test)]
+mod same;
+
 use std::collections::BTreeMap;
 use std::io::Read;
+
+use lines::{Lines, RowLines};
+use quick::Unusual;
 
 use crate::dialect::{self, delimiter, number};
 use crate::error::RecordingError;
@@ -35,73 +43,13 @@ pub fn read_csv_from(mut reader: impl Read, source_name: &str) -> Result<Table, 
 
 pub(crate) fn parse_csv(text: &str, log: &str) -> Result<Table, RecordingError> {
     let spaced = dialect::tabs_for_spaces(text);
-    let text = &*spaced;
-    let delimiter = delimiter(text);
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .comment(Some(b'#'))
-        .delimiter(delimiter)
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let mut lines = Lines {
-        text: text.as_bytes(),
-        at: 0,
-        line: 1,
-    };
-    let mut record = csv::StringRecord::new();
-    let mut rows = Rows {
-        log,
-        delimiter,
-        columns: Vec::new(),
-        labels: BTreeMap::new(),
-        origins: BTreeMap::new(),
-        run: TableRun::default(),
-        named: true,
-    };
-    while reader
-        .read_record(&mut record)
-        .map_err(|e| RecordingError::Io {
-            path: log.into(),
-            action: "read",
-            message: e.to_string().into(),
-        })?
-    {
-        let line = lines.of(record.position().map_or(0, |p| p.byte()));
-        if record.iter().all(str::is_empty) && record.len() <= 1 {
-            continue;
-        }
-        rows.record(&record, line)?;
+    let mut rows = Rows::new(log, delimiter(&spaced));
+    let to = rows.general(&spaced, true)?;
+    if rows.quick(&spaced, to).is_err() {
+        rows = Rows::new(log, rows.delimiter);
+        rows.general(&spaced, false)?;
     }
-    let Rows {
-        columns,
-        labels,
-        origins,
-        mut run,
-        named,
-        ..
-    } = rows;
-    if columns.is_empty() {
-        return Err(RecordingError::Empty { log: log.into() });
-    }
-    run.first_line = *run
-        .lines
-        .first()
-        .ok_or_else(|| RecordingError::HeaderOnly { log: log.into() })?;
-    let width = columns.len().max(1);
-    let first = || run.rows.iter().step_by(width);
-    let rising = !named && width > 1 && first().zip(first().skip(1)).all(|(a, b)| a < b);
-    if run.lines.windows(2).all(|w| w[1] == w[0] + 1) {
-        run.lines = Vec::new();
-    }
-    Ok(Table {
-        source: log.into(),
-        columns,
-        runs: vec![run],
-        labels,
-        stamps: origins.into_keys().next().or(rising.then_some(0)),
-        ..Table::default()
-    })
+    rows.table()
 }
 
 /// What was read so far.
@@ -113,11 +61,111 @@ struct Rows<'l> {
     /// Columns of dates and times, and the first of each, ns.
     origins: BTreeMap<usize, i64>,
     run: TableRun,
+    lines: RowLines,
     /// There is a header.
     named: bool,
 }
 
-impl Rows<'_> {
+impl<'l> Rows<'l> {
+    fn new(log: &'l str, delimiter: u8) -> Self {
+        Self {
+            log,
+            delimiter,
+            columns: Vec::new(),
+            labels: BTreeMap::new(),
+            origins: BTreeMap::new(),
+            run: TableRun::default(),
+            lines: RowLines::default(),
+            named: true,
+        }
+    }
+
+    /// Reads the text, or up to the first row of it; says where it stopped.
+    fn general(&mut self, text: &str, first_only: bool) -> Result<usize, RecordingError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .comment(Some(b'#'))
+            .delimiter(self.delimiter)
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let mut lines = Lines::new(text.as_bytes());
+        let mut record = csv::StringRecord::new();
+        let log = self.log;
+        while reader
+            .read_record(&mut record)
+            .map_err(|e| RecordingError::Io {
+                path: log.into(),
+                action: "read",
+                message: e.to_string().into(),
+            })?
+        {
+            let line = lines.of(record.position().map_or(0, |p| p.byte()));
+            if record.iter().all(str::is_empty) && record.len() <= 1 {
+                continue;
+            }
+            self.record(&record, line)?;
+            if first_only && !self.lines.is_empty() {
+                break;
+            }
+        }
+        let byte = usize::try_from(reader.position().byte());
+        Ok(byte.map_or(text.len(), |byte| byte.min(text.len())))
+    }
+
+    /// Reads the rows behind the first one, from `byte` on.
+    fn quick(&mut self, text: &str, byte: usize) -> Result<(), Unusual> {
+        let (before, rest) = text.split_at_checked(byte).ok_or(Unusual)?;
+        let plain = quick::Rows {
+            delimiter: self.delimiter,
+            width: self.columns.len(),
+        };
+        if rest.is_empty() {
+            return Ok(());
+        }
+        if !plain.plain() {
+            return Err(Unusual);
+        }
+        let line = 1 + memchr::memchr_iter(b'\n', before.as_bytes()).count();
+        let mut values = std::mem::take(&mut self.run.rows);
+        let mut lines = std::mem::take(&mut self.lines);
+        let words: Vec<usize> = (self.labels.keys().chain(self.origins.keys()))
+            .copied()
+            .collect();
+        let read = match words.is_empty() {
+            true => plain.numbers(rest, line, &mut values, &mut lines),
+            false => {
+                let value = |at: usize, field: &str, line| self.value(at, field, false, line).ok();
+                plain.mixed(rest, line, &words, value, (&mut values, &mut lines))
+            }
+        };
+        (self.run.rows, self.lines) = (values, lines);
+        read
+    }
+
+    /// The table, when all was read.
+    fn table(self) -> Result<Table, RecordingError> {
+        let (log, mut run) = (self.log, self.run);
+        if self.columns.is_empty() {
+            return Err(RecordingError::Empty { log: log.into() });
+        }
+        if self.lines.is_empty() {
+            return Err(RecordingError::HeaderOnly { log: log.into() });
+        }
+        (run.first_line, run.lines) = self.lines.first_and_all();
+        let width = self.columns.len().max(1);
+        let first = || run.rows.iter().step_by(width);
+        let rising = !self.named && width > 1 && first().zip(first().skip(1)).all(|(a, b)| a < b);
+        Ok(Table {
+            source: log.into(),
+            columns: self.columns,
+            runs: vec![run],
+            labels: self.labels,
+            stamps: (self.origins.into_keys().next()).or(rising.then_some(0)),
+            ..Table::default()
+        })
+    }
+
     fn record(&mut self, record: &csv::StringRecord, line: usize) -> Result<(), RecordingError> {
         if self.columns.is_empty() {
             let said = record
@@ -147,7 +195,7 @@ impl Rows<'_> {
                 found: record.len(),
             });
         }
-        if self.run.lines.is_empty()
+        if self.lines.is_empty()
             && let Some(units) = dialect::units(record)
         {
             for (column, unit) in self.columns.iter_mut().zip(units) {
@@ -155,8 +203,8 @@ impl Rows<'_> {
             }
             return Ok(());
         }
-        let first = self.run.lines.is_empty();
-        self.run.lines.push(line);
+        let first = self.lines.is_empty();
+        self.lines.push(line);
         for (at, field) in record.iter().take(n).enumerate() {
             let value = self.value(at, field, first, line)?;
             self.run.rows.push(value);
@@ -253,36 +301,6 @@ fn index_of(words: &mut Vec<String>, field: &str) -> f64 {
             words.len() - 1
         });
     at as f64
-}
-
-/// Line numbers of rising byte positions; blank lines and comments before a record are skipped.
-struct Lines<'t> {
-    text: &'t [u8],
-    at: usize,
-    line: usize,
-}
-
-impl Lines<'_> {
-    fn of(&mut self, byte: u64) -> usize {
-        let byte = usize::try_from(byte)
-            .unwrap_or(usize::MAX)
-            .min(self.text.len());
-        let mut comment = false;
-        while let Some(b) = self.text.get(self.at) {
-            if self.at >= byte {
-                match b {
-                    b'#' => comment = true,
-                    b'\n' => comment = false,
-                    b'\r' => {}
-                    _ if comment => {}
-                    _ => break,
-                }
-            }
-            self.line += usize::from(*b == b'\n');
-            self.at += 1;
-        }
-        self.line
-    }
 }
 
 #[cfg(test)]

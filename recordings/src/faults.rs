@@ -48,7 +48,7 @@ fn irregular_time(recording: &Recording) -> Option<Fault> {
         .iter()
         .flat_map(|run| run.time().windows(2).map(|w| w[1] - w[0]))
         .collect();
-    steps.sort_by(f64::total_cmp);
+    steps.sort_unstable_by(f64::total_cmp);
     let [min, low, median, high, max] = [0.0, 0.01, 0.5, 0.99, 1.0].map(|q| quantile(&steps, q));
     if (high - low) <= IRREGULAR * median || steps.is_empty() {
         return None;
@@ -77,7 +77,7 @@ fn quantile(sorted: &[f64], q: f64) -> f64 {
 /// The magnitude that 98 % of the values do not exceed: a maximum that ignores outliers.
 pub(crate) fn large(values: impl Iterator<Item = f64>) -> f64 {
     let mut magnitudes: Vec<f64> = values.map(f64::abs).filter(|v| v.is_finite()).collect();
-    magnitudes.sort_by(f64::total_cmp);
+    magnitudes.sort_unstable_by(f64::total_cmp);
     quantile(&magnitudes, 0.98)
 }
 

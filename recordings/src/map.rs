@@ -20,7 +20,7 @@ use crate::faults;
 use crate::plan::Plan;
 use crate::segment::{Inputs, Segments, segment};
 use crate::source::Source;
-use crate::table::{Table, TableRun};
+use crate::table::{RunRows, Table, TableRun};
 pub(crate) use short::run_names;
 use tally::Tally;
 
@@ -190,17 +190,22 @@ impl<'a> Mapper<'a> {
             self.empty.push(&run.name);
             return Ok(());
         }
-        let rows: Vec<&[f64]> = self.table.rows(run).collect();
+        let rows = RunRows::new(&run.rows, self.table.columns.len());
         // Runs of equal numbers in the column of the run, or all rows.
-        let number = |row: &&[f64]| self.plan.run.map(|c| row[c].to_bits());
+        let number = |at: usize| self.plan.run.map(|c| rows.row(at)[c].to_bits());
         let mut start = 0;
-        for group in rows.chunk_by(|a, b| number(a) == number(b)) {
+        while start < rows.len() {
+            let end = match self.plan.run {
+                Some(_) => (start..rows.len()).find(|at| number(*at) != number(start)),
+                None => None,
+            };
+            let group = start..end.unwrap_or(rows.len());
             let name = match self.plan.run {
-                Some(column) => self.group_name(run, column, group[0][column]),
+                Some(column) => self.group_name(run, column, rows.row(start)[column]),
                 None => run.name.clone(),
             };
-            self.group(run, &rows, start..start + group.len(), &name)?;
-            start += group.len();
+            self.group(run, rows, group.clone(), &name)?;
+            start = group.end;
         }
         Ok(())
     }
@@ -220,43 +225,43 @@ impl<'a> Mapper<'a> {
     fn group(
         &mut self,
         run: &TableRun,
-        rows: &[&[f64]],
+        rows: RunRows<'_>,
         range: std::ops::Range<usize>,
         name: &str,
     ) -> Result<(), RecordingError> {
         let time = self.plan.time;
         // Shifted before scaled: large stamps (microseconds since 1970) keep their digits.
-        let origin = rows.get(range.start).map_or(0.0, |row| row[time.column]);
+        let first_row = range.start;
+        let origin = rows.row(first_row)[time.column];
         let mut times = Vec::with_capacity(range.len());
-        let span = range.clone();
-        for at in range {
-            let stamp = rows[at][time.column];
+        for at in range.clone() {
+            let stamp = rows.row(at)[time.column];
             self.check(run, at, time, stamp, "the time")?;
             self.seconds(run, at, stamp * time.factor)?;
             let shifted = self.exact((stamp - origin) * time.factor);
             self.limit(run, at, time, shifted)?;
-            times.push((at, shifted));
+            times.push(shifted);
         }
         self.rows += times.len();
         // A channel with a clock of its own says nothing while it stays as it is.
         let columns = self.plan.inputs.iter().filter_map(|(link, _)| *link);
         let columns = columns.map(|link| link.column).filter(|_| !self.own_clocks);
-        let inputs = Inputs::new(&rows[span], columns.collect());
-        let cut = segment(&times, &inputs);
+        let inputs = Inputs::new(rows.part(range), columns.collect());
+        let cut = segment(first_row, &times, &inputs);
         self.count_cuts(run, rows, &cut);
-        let first_row = times.first().map_or(0, |(at, _)| *at);
         for part in &cut.parts {
             let part_name = self.part_name(name);
-            let time_of = |at: &usize| times[at - first_row].1;
+            let time_of = |at: &usize| times[at - first_row];
             let start = part.first().map_or(0.0, time_of);
             let times = part
                 .iter()
                 .map(|at| self.exact(time_of(at) - start))
                 .collect();
-            let mut inputs = Rows::new(self.plan.inputs.len(), Vec::new());
-            let mut measured = Rows::new(self.plan.measured.len(), Vec::new());
+            let room = |width: usize| Rows::new(width, Vec::with_capacity(width * part.len()));
+            let mut inputs = room(self.plan.inputs.len());
+            let mut measured = room(self.plan.measured.len());
             for at in part {
-                self.row(run, *at, rows[*at], &mut inputs, &mut measured)?;
+                self.row(run, *at, rows.row(*at), &mut inputs, &mut measured)?;
             }
             let built = Run::new(part_name, times, inputs, measured);
             self.runs.push(built.map_err(|error| RecordingError::Run {
@@ -285,10 +290,10 @@ impl<'a> Mapper<'a> {
         }
     }
 
-    fn count_cuts(&mut self, run: &TableRun, rows: &[&[f64]], cut: &Segments) {
+    fn count_cuts(&mut self, run: &TableRun, rows: RunRows<'_>, cut: &Segments) {
         let (table, time) = (self.table, self.plan.time);
         let place = |row: usize| {
-            let stamp = rows[row][time.column];
+            let stamp = rows.row(row)[time.column];
             format!("{}: {stamp}", table.location(run, row, time.column))
         };
         for row in &cut.duplicates {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::median::median;
+use crate::table::RunRows;
 
 /// A jump back by more than this many periods is the start of another run, appended to the file.
 pub(crate) const NEW_RUN_PERIODS: f64 = 10.0;
@@ -36,13 +37,13 @@ pub(crate) struct Segments {
 
 /// The inputs of the rows of a run.
 pub(crate) struct Inputs<'r> {
-    rows: &'r [&'r [f64]],
+    rows: RunRows<'r>,
     columns: Vec<usize>,
 }
 
 impl<'r> Inputs<'r> {
     /// Those in some `columns`.
-    pub(crate) fn new(rows: &'r [&'r [f64]], columns: Vec<usize>) -> Self {
+    pub(crate) fn new(rows: RunRows<'r>, columns: Vec<usize>) -> Self {
         Self { rows, columns }
     }
 
@@ -63,23 +64,24 @@ impl<'r> Inputs<'r> {
     }
 }
 
-/// Cuts the rows of a run where their time stamps, in seconds, jump, and where so many rows are missing that the
-/// `inputs` between them are not known.
-pub(crate) fn segment(times: &[(usize, f64)], inputs: &Inputs<'_>) -> Segments {
+/// Cuts the rows of a run, from `first` on, where their time stamps, in seconds, jump, and where so many rows are missing
+/// that the `inputs` between them are not known.
+pub(crate) fn segment(first: usize, times: &[f64], inputs: &Inputs<'_>) -> Segments {
     let mut steps: Vec<f64> = times
         .windows(2)
-        .map(|w| w[1].1 - w[0].1)
+        .map(|w| w[1] - w[0])
         .filter(|step| *step > 0.0)
         .collect();
     let period = median(&mut steps);
+    drop(steps);
     let gap = GAP_TIME.max(GAP_PERIODS * period);
     let mut out = Segments::default();
     let mut part: Vec<usize> = Vec::new();
     let (mut origin, mut last) = (f64::NAN, f64::NAN);
-    let end = times.last().map_or(f64::NAN, |(_, time)| *time);
+    let end = times.last().copied().unwrap_or(f64::NAN);
     // By the number of rows that are missing: there are no more such numbers than rows in `GAP_TIME`.
     let mut forgotten = BTreeMap::new();
-    for &(row, time) in times {
+    for (row, &time) in (first..).zip(times) {
         let step = time - last;
         if part.is_empty() {
             origin = time;
@@ -125,10 +127,8 @@ mod tests {
     use super::*;
 
     fn with_input(times: &[f64], input: impl Fn(f64) -> f64) -> Segments {
-        let rows: Vec<[f64; 1]> = times.iter().map(|t| [input(*t)]).collect();
-        let rows: Vec<&[f64]> = rows.iter().map(|row| &row[..]).collect();
-        let times: Vec<(usize, f64)> = times.iter().copied().enumerate().collect();
-        segment(&times, &Inputs::new(&rows, vec![0]))
+        let rows: Vec<f64> = times.iter().map(|t| input(*t)).collect();
+        segment(0, times, &Inputs::new(RunRows::new(&rows, 1), vec![0]))
     }
 
     fn of(times: &[f64]) -> Segments {

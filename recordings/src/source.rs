@@ -137,7 +137,7 @@ fn read_text(bytes: &[u8], log: &str) -> Result<Source, RecordingError> {
 /// The bytes as text, without byte order mark.
 pub(crate) fn as_text<'b>(bytes: &'b [u8], log: &str) -> Result<&'b str, RecordingError> {
     let log = || log.to_owned();
-    if let Some(position) = bytes.iter().position(|b| *b == 0) {
+    if let Some(position) = memchr::memchr(0, bytes) {
         return Err(RecordingError::Binary {
             log: log().into(),
             position: position + 1,

@@ -65,6 +65,39 @@ impl ColumnName {
     }
 }
 
+/// The rows of a run by their numbers, without a list of them.
+#[derive(Clone, Copy)]
+pub(crate) struct RunRows<'t> {
+    values: &'t [f64],
+    width: usize,
+}
+
+impl<'t> RunRows<'t> {
+    pub(crate) fn new(values: &'t [f64], width: usize) -> Self {
+        Self {
+            values,
+            width: width.max(1),
+        }
+    }
+
+    pub(crate) fn len(self) -> usize {
+        self.values.len() / self.width
+    }
+
+    pub(crate) fn row(self, at: usize) -> &'t [f64] {
+        &self.values[self.width * at..self.width * (at + 1)]
+    }
+
+    pub(crate) fn part(self, rows: Range<usize>) -> Self {
+        let values = &self.values[self.width * rows.start..self.width * rows.end];
+        Self { values, ..self }
+    }
+
+    pub(crate) fn iter(self) -> std::slice::ChunksExact<'t, f64> {
+        self.values.chunks_exact(self.width)
+    }
+}
+
 impl TableRun {
     /// Number of the line on which a row (from 0) stands; none when the format has no lines.
     pub fn line(&self, row: usize) -> Option<usize> {

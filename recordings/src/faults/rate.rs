@@ -134,13 +134,11 @@ fn ratio(table: &Table, plan: &Plan, angle: &Column, rate: &Column) -> Option<(f
     let value = |row: &[f64], c: &Column| row[c.at] * c.factor;
     let time = |row: &[f64]| row[plan.time.column] * plan.time.factor;
     for run in &table.runs {
-        let rows: Vec<&[f64]> = table.rows(run).collect();
-        let Some(mut start) = rows.first().copied() else {
+        let Some(mut start) = table.rows(run).next() else {
             continue;
         };
         let (mut integral, mut usable) = (0.0, true);
-        for pair in rows.windows(2) {
-            let [before, now] = pair else { continue };
+        for (before, now) in table.rows(run).zip(table.rows(run).skip(1)) {
             let step = time(now) - time(before);
             // A gap, a jump or a hole spoils the piece.
             let moved = value(now, angle) - value(before, angle);
