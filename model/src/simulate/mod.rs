@@ -6,6 +6,7 @@ mod foresee;
 pub(crate) mod history;
 mod lengthen;
 mod observer;
+mod plan;
 mod push;
 mod ramp;
 mod sensing;
@@ -28,10 +29,10 @@ use bound::{Bounds, Scene};
 pub use follow::{follow, free_run, try_follow};
 use history::{Between, History};
 use lengthen::Lengthened;
+use plan::Plan;
 use push::Pushed;
 use sensing::{Integral, Sensing, sense};
 pub use state_observer::StateObserver;
-use step::Plan;
 use stiff::{Implicit, Way};
 
 /// Integrates a model through time.

@@ -1,6 +1,6 @@
 //! Integration steps: what acts on the plant, and by which method it moves.
 
-use super::bound::{Bounds, Group, Scene};
+use super::bound::Scene;
 use super::ramp::{hold_means, ramped};
 use super::sensing::Integral;
 use super::stiff::Way;
@@ -11,31 +11,6 @@ use loopsight_core::{NoPast, Now, Place, Steps, Under};
 
 /// Where the stages of a step lie, as parts of it.
 const PARTS: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
-
-/// The effects that act within a step, in the order in which they do.
-#[derive(Clone)]
-pub(super) struct Plan {
-    inputs: Vec<Group>,
-    efforts: Vec<Group>,
-    bodies: Vec<Group>,
-    /// Something acts on the plant that its own steps do not offer: it is not efforts alone, or has states.
-    beside: bool,
-    /// Nothing acts within a step, nor on the inputs before it.
-    alone: bool,
-}
-
-impl Plan {
-    /// Of the effects of a model with so many states, beside which others may be integrated, `size` in all.
-    pub(super) fn of(bounds: &Bounds, states: usize, size: usize) -> Self {
-        Self {
-            inputs: Group::of(&bounds.inputs, states),
-            efforts: Group::of(&bounds.efforts, states),
-            bodies: Group::of(&bounds.bodies, states),
-            beside: !bounds.inputs.is_empty() || !bounds.bodies.is_empty() || size > states,
-            alone: bounds.efforts.is_empty(),
-        }
-    }
-}
 
 impl<S: HostReal> Simulator<'_, S> {
     /// Whether the steps of an interval differ in nothing but where they begin: the inputs are constant over it, for every

@@ -1,0 +1,28 @@
+//! What acts within a step, as a list that is made once.
+
+use super::bound::{Bounds, Group};
+
+/// The effects that act within a step, in the order in which they do.
+#[derive(Clone)]
+pub(super) struct Plan {
+    pub(super) inputs: Vec<Group>,
+    pub(super) efforts: Vec<Group>,
+    pub(super) bodies: Vec<Group>,
+    /// Something acts on the plant that its own steps do not offer: it is not efforts alone, or has states.
+    pub(super) beside: bool,
+    /// Nothing acts within a step, nor on the inputs before it.
+    pub(super) alone: bool,
+}
+
+impl Plan {
+    /// Of the effects of a model with so many states, beside which others may be integrated, `size` in all.
+    pub(super) fn of(bounds: &Bounds, states: usize, size: usize) -> Self {
+        Self {
+            inputs: Group::of(&bounds.inputs, states),
+            efforts: Group::of(&bounds.efforts, states),
+            bodies: Group::of(&bounds.bodies, states),
+            beside: !bounds.inputs.is_empty() || !bounds.bodies.is_empty() || size > states,
+            alone: bounds.efforts.is_empty(),
+        }
+    }
+}
