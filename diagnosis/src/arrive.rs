@@ -26,7 +26,6 @@ const OTHERS: usize = 6;
 const SHORT: Effort = Effort {
     iterations: 12,
     tolerance: 1e-4,
-    worth: f64::INFINITY,
 };
 
 /// Where a fit began, and the error it ended with.

@@ -15,9 +15,6 @@ use crate::promise::Promises;
 use crate::starts::{Extent, first_starts, fresh_starts, starts_from};
 use crate::trial::{Judged, Nominal, finish, look};
 
-/// Short fits that are made to their end whatever they find.
-const MOST_PROMISING: usize = 4;
-
 /// A candidate by its index, and where to start it from.
 type Attempt = (usize, Vec<f64>);
 
@@ -116,9 +113,9 @@ impl Search<'_> {
         let extent = Extent::of(self.nominal.holdout.runs);
         let fitted = |candidate: &Candidate| {
             let starts = starts_from(candidate, best, extent);
-            let looks = starts.iter().filter_map(|start| {
-                look(&candidate.chosen(start), start, self.nominal, f64::INFINITY)
-            });
+            let looks = starts
+                .iter()
+                .filter_map(|start| look(&candidate.chosen(start), start, self.nominal));
             let first = looks.min_by(|a, b| a.error().total_cmp(&b.error()))?;
             let found = self.finished(first)?;
             (found.0.error() <= near(candidate)).then_some(found)
@@ -151,10 +148,7 @@ impl Search<'_> {
             promising.iter().cloned().partition(|(i, _)| simple(*i));
         let mut tried: BTreeSet<usize> = first.iter().map(|(i, _)| *i).collect();
         let mut looked = Vec::new();
-        // The most promising show how far the others have to come.
-        let (most, others) = first.split_at(first.len().min(MOST_PROMISING));
-        self.look_at(most, others.len() + waiting.len(), &mut looked);
-        self.look_at(others, waiting.len(), &mut looked);
+        self.look_at(&first, waiting.len(), &mut looked);
         // A candidate that contains another one comes after it, and starts from where that one ended. Where that
         // one failed, it starts from its own best start.
         while !self.work.is_cancelled() {
@@ -195,16 +189,13 @@ impl Search<'_> {
         promising.into_iter().map(|(_, attempt)| attempt).collect()
     }
 
-    /// Makes the short fits of some attempts; `waiting` more are to come. What cannot come near the best so far is given up:
-    /// nothing larger would start from it either.
+    /// Makes the short fits of some attempts; `waiting` more are to come.
     fn look_at(&self, attempts: &[Attempt], waiting: usize, looked: &mut Vec<(usize, Judged)>) {
         let done = AtomicU64::new(looked.len() as u64);
         let of = (looked.len() + attempts.len() + waiting) as u64;
         self.work.tell(Stage::FirstLooks, looked.len() as u64, of);
-        let so_far = least(looked.iter().map(|(_, found)| found));
-        let worth = self.criteria().worth_growing * so_far;
         let found = attempts.par_iter().filter_map(|(i, start)| {
-            let found = self.look(*i, start, worth);
+            let found = self.look(*i, start);
             self.tell(Stage::FirstLooks, &done, of);
             Some((*i, found?))
         });
@@ -213,17 +204,16 @@ impl Search<'_> {
 
     /// A short fit of a candidate, from its start. The plain model is its special case. Where the fit ended well above
     /// that one, the start was too strong for this machine, and it is made again from next to nothing.
-    /// It is given up where it does not come below `worth`.
-    fn look(&self, i: usize, start: &[f64], worth: f64) -> Option<Judged> {
+    fn look(&self, i: usize, start: &[f64]) -> Option<Judged> {
         let candidate = &self.all[i];
-        let found = look(&candidate.chosen(start), start, self.nominal, worth);
+        let found = look(&candidate.chosen(start), start, self.nominal);
         let most = self.criteria().elsewhere * nrmse(self.nominal.rank);
         if found.as_ref().is_some_and(|found| found.error() <= most) {
             return found;
         }
         let again = candidate.faint(start).and_then(|faint| {
             let chosen = candidate.chosen(&faint);
-            look(&chosen, &faint, self.nominal, worth)
+            look(&chosen, &faint, self.nominal)
         });
         found
             .into_iter()

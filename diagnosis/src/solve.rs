@@ -15,8 +15,6 @@ pub(crate) struct Effort {
     pub(crate) iterations: u64,
     /// Relative change of the cost below which it has converged.
     pub(crate) tolerance: f64,
-    /// Error of a fit that is not worth going on with.
-    pub(crate) worth: f64,
 }
 
 impl Effort {
@@ -24,7 +22,6 @@ impl Effort {
     pub(crate) const FULL: Self = Self {
         iterations: 100,
         tolerance: 1e-9,
-        worth: f64::INFINITY,
     };
 }
 
@@ -66,7 +63,11 @@ impl Problem<'_> {
         effort: Effort,
     ) -> Result<(DVector<f64>, bool), FitError> {
         let borrowed = Borrowed(self, effort);
-        let (solution, settled) = minimise(&borrowed, start, effort)?;
+        let Effort {
+            iterations,
+            tolerance,
+        } = effort;
+        let (solution, settled) = minimise(&borrowed, start, iterations, tolerance)?;
         if solution.iter().any(|v| !v.is_finite()) {
             return Err(FitError::Solver(
                 "the parameters became infinite".to_owned(),

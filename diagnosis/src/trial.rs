@@ -18,19 +18,16 @@ use crate::solve::Effort;
 const LOOK: Effort = Effort {
     iterations: 9,
     tolerance: 1e-3,
-    worth: f64::INFINITY,
 };
 /// Effort of a finalist.
 pub(crate) const FINAL: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
-    worth: f64::INFINITY,
 };
 /// That of its second pass, which begins near its end.
 const AGAIN: Effort = Effort {
     iterations: 5,
     tolerance: FINAL.tolerance,
-    worth: f64::INFINITY,
 };
 /// Longest integration steps of a look, in steps of the plant.
 pub(crate) const LOOK_STEPS: f64 = 2.0;
@@ -129,15 +126,8 @@ pub(crate) fn positions(candidate: &Candidate, start: &[f64]) -> Option<Position
         .flatten()
 }
 
-/// A quick fit of a candidate from one start, with the nominal initial states where they can be held. It is given up where
-/// its error does not come below `worth`.
-pub(crate) fn look(
-    candidate: &Candidate,
-    start: &[f64],
-    nominal: &Nominal<'_>,
-    worth: f64,
-) -> Option<Judged> {
-    let effort = Effort { worth, ..LOOK };
+/// A quick fit of a candidate from one start, with the nominal initial states where they can be held.
+pub(crate) fn look(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) -> Option<Judged> {
     nominal.work.go_on().ok()?;
     let model = coarse(candidate, LOOK_STEPS);
     let states = &nominal.solution.states;
@@ -152,9 +142,9 @@ pub(crate) fn look(
             let regressed = problem.stride(&start, states, &shape).ok()?;
             start = regressed.unwrap_or(start);
         }
-        start = problem.solve_from(&start, states, effort).ok()?.values;
+        start = problem.solve_from(&start, states, LOOK).ok()?.values;
     }
-    let solution = problem()?.solve_from(&start, states, effort).ok()?;
+    let solution = problem()?.solve_from(&start, states, LOOK).ok()?;
     Judged::of(candidate.clone(), &model, solution, nominal)
 }
 
