@@ -1,5 +1,7 @@
 //! What follows from the candidates: whether an effect is missing, and which.
 
+use loopsight_core::{EffectMeta, PlaceKind};
+
 use crate::advice::advice;
 use crate::candidates::Candidate;
 use crate::choose::choose;
@@ -105,10 +107,16 @@ impl Evidence<'_> {
     /// Whether the starts of the runs show the effect. They are not validation data, because the initial state
     /// is estimated from them. But they often have the only steps, so an effect that acts there need not improve
     /// the validation error. It must not make it worse, and that error must be more than noise.
+    ///
+    /// One effect may be named by the starts alone for what is late there. A second one only gives the same few steps
+    /// another shape, and would have room for whatever else is missing.
     fn shown_by_starts(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
         let explained = explained(self.nominal_fit, explanation.nrmse_fit);
-        self.nominal.holdout.test.is_none()
+        let effects = self.nominal.model.effects.iter();
+        let again = is_late(judged.candidate.meta) && effects.map(|e| e.meta).any(is_late);
+        !again
+            && self.nominal.holdout.test.is_none()
             && self.above_floor(self.error())
             && nrmse(&judged.losses) <= criteria.no_worse * self.error()
             && explanation.significance > criteria.certain
@@ -151,6 +159,12 @@ impl Evidence<'_> {
 /// The part of an error that an explanation removes when it leaves `left`: squared errors add up.
 pub(crate) fn explained(error: f64, left: f64) -> f64 {
     (error.powi(2) - left.powi(2)).max(0.0).sqrt()
+}
+
+/// Whether an effect makes an input or a sensor answer later, or over some time.
+fn is_late(meta: &EffectMeta) -> bool {
+    let between = |place: &PlaceKind| matches!(place, PlaceKind::Input | PlaceKind::Output);
+    (meta.memory || meta.states > 0) && meta.places.iter().all(between)
 }
 
 /// Whether the log determines how strong the effect is. An effect that cannot be told from the plant's own

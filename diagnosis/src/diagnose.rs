@@ -157,7 +157,7 @@ fn steps(
     let criteria = work.criteria();
     let holdout = Holdout::new(model, runs, test.as_deref(), &criteria.holdout);
     diagnosis.observer = Correction::of(runs);
-    diagnosis.floor.nrmse = floor(model, test.as_deref().unwrap_or(runs), &criteria.log);
+    diagnosis.floor.nrmse = floor(model, &holdout.judging(), &criteria.log);
 
     let plain = fit_plain(diagnosis, model, &holdout, work)?;
     let moves = moves_starts(&plain.model, &plain.solution, runs, work)?;
@@ -185,7 +185,7 @@ fn steps(
     let test = (measurements.test).map(|test| attach_same_observer(model, test, runs, work));
     let test = test.transpose()?;
     let holdout = Holdout::new(model, &all, test.as_deref(), &criteria.holdout);
-    diagnosis.floor.nrmse = floor(model, test.as_deref().unwrap_or(&all), &criteria.log);
+    diagnosis.floor.nrmse = floor(model, &holdout.judging(), &criteria.log);
     let plain = plain_on_all(diagnosis, &nominal, &holdout, &first)?;
     let nominal = Nominal {
         model: &plain.model,
@@ -222,7 +222,11 @@ fn conclude_from(
         unseen,
         nominal_fit: diagnosis.nominal_fit,
         floor: diagnosis.floor.nrmse,
-        floor_fit: floor(nominal.given, runs, &work.criteria().log),
+        floor_fit: floor(
+            nominal.given,
+            &nominal.holdout.fitting(),
+            &work.criteria().log,
+        ),
         predictable: predictable(nominal.model, nominal.solution, runs, work)?,
         least: aim.least,
     };

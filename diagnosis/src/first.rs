@@ -5,7 +5,7 @@ use loopsight_model::run::Run;
 use nalgebra::DVector;
 
 use crate::criteria::{Criteria, StartCriteria};
-use crate::floor::noise;
+use crate::floor::{Part, noise};
 use crate::problem::Problem;
 use crate::progress::Cancelled;
 use crate::window::lags;
@@ -32,7 +32,7 @@ use crate::window::lags;
 /// section 4.3.)
 pub(crate) fn first_weights(model: &Model, runs: &[Run], criteria: &Criteria) -> Vec<Vec<f64>> {
     let known: Vec<(f64, f64)> = (model.measured.iter().enumerate())
-        .map(|(i, m)| noise(&m.sensor, i, runs, &criteria.log))
+        .map(|(i, m)| noise(&m.sensor, i, &Part::all(runs), &criteria.log))
         .collect();
     runs.iter()
         .map(|run| {

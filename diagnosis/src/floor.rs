@@ -1,5 +1,7 @@
 //! The error that noise and resolution alone would leave.
 
+use std::ops::Range;
+
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
@@ -27,14 +29,17 @@ use crate::score::Tally;
 ///   adds `(rate · h)²/12`. A coarse log that repeats a value was read all the same.
 ///
 /// Of a long log [pieces](crate::long) tell the noise; the deviation of the signal is that of all samples.
-pub(crate) fn floor(model: &Model, runs: &[Run], criteria: &LogCriteria) -> f64 {
+///
+/// The noise is that of the samples of `part`, so that an error is held against the noise of the samples that it was
+/// measured on: a sensor that jumps once makes no floor where it does not.
+pub(crate) fn floor(model: &Model, part: &Part<'_>, criteria: &LogCriteria) -> f64 {
     let n = model.measured.len();
     let sum: f64 = model
         .measured
         .iter()
         .enumerate()
         .map(|(signal, measured)| {
-            let (noise, std) = noise(&measured.sensor, signal, runs, criteria);
+            let (noise, std) = noise(&measured.sensor, signal, part, criteria);
             let relative = noise / std;
             if relative.is_finite() {
                 relative * relative
@@ -46,11 +51,57 @@ pub(crate) fn floor(model: &Model, runs: &[Run], criteria: &LogCriteria) -> f64 
     (sum / n.max(1) as f64).sqrt()
 }
 
-/// Standard deviations of the noise of the `signal`-th measured signal, and of the signal itself.
+/// Samples of recordings: all of them, or those that a fit sees, or those that judge it.
+pub(crate) struct Part<'a> {
+    pub(crate) runs: &'a [Run],
+    /// By run and sample whether a fit sees it, and which of the two the part is.
+    pub(crate) seen: Option<(&'a [Vec<bool>], bool)>,
+}
+
+impl<'a> Part<'a> {
+    pub(crate) fn all(runs: &'a [Run]) -> Self {
+        Self { runs, seen: None }
+    }
+
+    /// Itself, or all samples where it has too few to tell a noise.
+    fn or_all(&self) -> Self {
+        let few = (self.seen).is_some_and(|(seen, which)| {
+            seen.iter().flatten().filter(|s| **s == which).count() < BLOCK
+        });
+        Self {
+            runs: self.runs,
+            seen: self.seen.filter(|_| !few),
+        }
+    }
+
+    /// The longest rows of samples of a run, within its [pieces], that belong to the part.
+    fn stretches(&self, run: usize) -> Vec<Range<usize>> {
+        let rows = pieces(self.runs[run].len());
+        let Some((seen, which)) = self.seen else {
+            return rows.collect();
+        };
+        rows.flat_map(|piece| {
+            let start = piece.start;
+            let same = seen[run][piece].chunk_by(|a, b| a == b);
+            let ends = same.scan(start, |end, row| {
+                let start = *end;
+                *end += row.len();
+                Some((start..*end, row[0] == which))
+            });
+            ends.filter(|(_, belongs)| *belongs)
+                .map(|(row, _)| row)
+                .collect::<Vec<_>>()
+        })
+        .collect()
+    }
+}
+
+/// Standard deviations of the noise of the `signal`-th measured signal in a part of the samples, and of the signal
+/// itself in all of them.
 pub(crate) fn noise(
     sensor: &Sensor,
     signal: usize,
-    runs: &[Run],
+    part: &Part<'_>,
     criteria: &LogCriteria,
 ) -> (f64, f64) {
     let mut tally = Tally::default();
@@ -59,13 +110,14 @@ pub(crate) fn noise(
     let mut holds = Vec::new();
     let mut rate = Tally::default();
     let mut period = f64::NAN;
-    for run in runs {
+    let part = part.or_all();
+    for (index, run) in part.runs.iter().enumerate() {
         let step = run.median_period();
         for k in 0..run.len() {
             let y = run.sample(k)[signal];
             tally.add(y, y);
         }
-        for piece in pieces(run.len()) {
+        for piece in part.stretches(index) {
             let values = piece.clone().map(|k| run.sample(k)[signal]);
             every.push(values.filter(|y| y.is_finite()).collect());
             let mut news: Vec<(f64, f64)> = Vec::new();
@@ -235,7 +287,13 @@ mod tests {
     fn of(measured: Vec<f64>) -> f64 {
         let time = (0..measured.len()).map(|k| 0.02 * k as f64).collect();
         let run = Run::new("", time, Rows::default(), Rows::new(1, measured)).unwrap();
-        noise(&Sensor::Instantaneous, 0, &[run], &LogCriteria::DEFAULT).0
+        noise(
+            &Sensor::Instantaneous,
+            0,
+            &Part::all(&[run]),
+            &LogCriteria::DEFAULT,
+        )
+        .0
     }
 
     #[test]
@@ -307,7 +365,12 @@ mod tests {
             .sum::<f64>()
             / f64::from(n);
         let run = Run::new("", time, Rows::default(), Rows::new(1, measured)).unwrap();
-        let (noise, _) = noise(&Sensor::Instantaneous, 0, &[run], &LogCriteria::DEFAULT);
+        let (noise, _) = noise(
+            &Sensor::Instantaneous,
+            0,
+            &Part::all(&[run]),
+            &LogCriteria::DEFAULT,
+        );
         assert!(
             (noise / left.sqrt() - 1.0).abs() < 0.1,
             "{noise} {}",

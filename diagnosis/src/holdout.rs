@@ -5,6 +5,7 @@ use loopsight_model::run::Run;
 use loopsight_model::simulate::{Simulator, try_follow};
 
 use crate::criteria::HoldoutCriteria;
+use crate::floor::Part;
 use crate::judge::Losses;
 use crate::long::ENOUGH;
 use crate::prediction::{InitialStates, Solution};
@@ -68,6 +69,26 @@ impl<'a> Holdout<'a> {
             test,
             seen,
             group,
+        }
+    }
+
+    /// The samples that solutions are judged on.
+    pub(crate) fn judging(&self) -> Part<'_> {
+        match self.test {
+            Some(test) => Part::all(test),
+            None => self.part_of_runs(false),
+        }
+    }
+
+    /// The samples that fits see.
+    pub(crate) fn fitting(&self) -> Part<'_> {
+        self.part_of_runs(true)
+    }
+
+    fn part_of_runs(&self, which: bool) -> Part<'_> {
+        Part {
+            runs: self.runs,
+            seen: self.seen.as_deref().map(|seen| (seen, which)),
         }
     }
 

@@ -198,7 +198,8 @@ impl<'a> Design<'a> {
         let mut deviation = Vec::new();
         let mut noise = Vec::new();
         for (signal, measured) in model.measured.iter().enumerate() {
-            let (sensor, std) = floor::noise(&measured.sensor, signal, runs, criteria);
+            let (sensor, std) =
+                floor::noise(&measured.sensor, signal, &floor::Part::all(runs), criteria);
             noise.push(sensor.max(LEAST_NOISE * std).max(f64::MIN_POSITIVE));
             deviation.push(std);
         }

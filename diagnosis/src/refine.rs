@@ -20,7 +20,8 @@ use crate::solve::Effort;
 /// * an effect that the last one made needless is removed, and its step with it;
 /// * a simpler effect replaces one that contains it, where the error hardly grows;
 /// * an effect that the data could not tell from an earlier one replaces it, where the error falls (the
-///   `diagnoses` of the earlier steps name them);
+///   `diagnoses` of the earlier steps name them); the same effect at fewer places only where nothing else is missing
+///   then;
 /// * the sign of the last effect is made sharper while the error falls.
 ///
 /// The steps are changed with the model. If the work is cancelled, the two still agree. False where the last step is no
@@ -186,20 +187,39 @@ fn reconsidered(
     steps: &mut [ImprovementStep],
     diagnoses: &[Diagnosis],
 ) -> Result<(), FitError> {
-    let criteria = &best.work.criteria().improve;
+    let criteria = best.work.criteria();
+    let better = criteria.improve.better;
+    let floor = diagnoses.last().map_or(0.0, |d| d.floor.nrmse);
     for step in steps {
         let others = twins(step, diagnoses);
         let Some(place) = step.added.as_mut() else {
             continue;
         };
-        let others = others.into_iter();
-        let candidates =
-            others.filter_map(|other| Some((other, exchanged(best.model, place, other)?)));
-        if let Some(other) = best.takes(candidates.collect(), |_| criteria.better)? {
-            *place = other.clone();
+        let (narrower, others): (Vec<_>, Vec<_>) = others
+            .into_iter()
+            .partition(|other| is_narrower(other, place));
+        for (others, most) in [
+            (others, f64::INFINITY),
+            // At one side it also stands for whatever else makes the sides differ, while that is missing.
+            (narrower, criteria.missing.above_floor * floor),
+        ] {
+            let candidates = others.into_iter();
+            let candidates = candidates
+                .filter_map(|other| Some((other, exchanged(best.model, place, other)?)))
+                .collect();
+            if let Some(other) = best.takes_below(candidates, |_| better, most)? {
+                *place = other.clone();
+                break;
+            }
         }
     }
     Ok(())
+}
+
+/// Whether an effect is another one at fewer of its places.
+fn is_narrower(this: &EffectAt, other: &EffectAt) -> bool {
+    let within = this.at.iter().all(|at| other.at.contains(at));
+    this.effect == other.effect && within && this.at.len() < other.at.len()
 }
 
 /// For each of `steps`, the effects that the data still cannot tell from its own at the end. These are twins of
@@ -289,6 +309,16 @@ impl Refined<'_> {
         candidates: Vec<(T, Model)>,
         share: impl Fn(&Model) -> f64 + Sync,
     ) -> Result<Option<T>, FitError> {
+        self.takes_below(candidates, share, f64::INFINITY)
+    }
+
+    /// As [`Refined::takes`], of those whose error is at `most` so large.
+    fn takes_below<T: Send>(
+        &mut self,
+        candidates: Vec<(T, Model)>,
+        share: impl Fn(&Model) -> f64 + Sync,
+        most: f64,
+    ) -> Result<Option<T>, FitError> {
         if candidates.is_empty() {
             return Ok(None);
         }
@@ -304,7 +334,7 @@ impl Refined<'_> {
             },
         };
         self.error = Some(now);
-        let bar = |model: &Model| share(model) * now;
+        let bar = |model: &Model| (share(model) * now).min(most);
         let fitted = no_worse(candidates, bar, self.measurements, &silent)?;
         let best = fitted.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
         Ok(best.map(|(what, error, model)| {

@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::criteria::LogCriteria;
-use crate::floor::noise;
+use crate::floor::{Part, noise};
 use crate::prediction::Solution;
 use crate::progress::{Cancelled, Work};
 
@@ -176,7 +176,12 @@ fn sensors(model: &Model, run: &Run, criteria: &LogCriteria) -> (DVector<f64>, D
     let mut white = DVector::zeros(n);
     let mut rounding = DVector::zeros(n);
     for (i, measured) in model.measured.iter().enumerate() {
-        let (noise, std) = noise(&measured.sensor, i, std::slice::from_ref(run), criteria);
+        let (noise, std) = noise(
+            &measured.sensor,
+            i,
+            &Part::all(std::slice::from_ref(run)),
+            criteria,
+        );
         let least = (LEAST_NOISE * std).max(f64::MIN_POSITIVE.sqrt()).powi(2);
         if matches!(measured.sensor, Sensor::EncoderCounts(_)) {
             white[i] = least;

@@ -80,6 +80,11 @@ impl<S: HostReal> Simulator<'_, S> {
         let Some(mut kept) = self.lengthened.take() else {
             return self.integrate(input, span, most, true);
         };
+        if self.x.iter().any(|x| !x.value().is_finite()) {
+            // What has run away does not come back: no number of steps would do.
+            self.lengthened = Some(kept);
+            return self.integrate(input, span, 1, true);
+        }
         kept.before.clone_from(&self.x);
         let mut way = match kept.way {
             Way::Implicit if kept.steps < NOT_STIFF => Way::Implicit,

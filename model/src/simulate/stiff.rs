@@ -8,6 +8,9 @@ use nalgebra::DMatrix;
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 /// Difference for the Jacobian, relative to a state: the root of the rounding error.
 const DIFFERENCE: f64 = 1e-8;
+/// Share by which a slope may differ between a small and a large difference and still be that of a straight line: rounding
+/// of the small one makes less.
+const CURVED: f64 = 0.1;
 /// Squarings for the spectral radius: what the units of the states distort, shows in it by its 32nd root.
 const SQUARINGS: usize = 5;
 /// Radius of the half disc in which the classical method of Runge and Kutta is stable.
@@ -103,15 +106,32 @@ impl<S: HostReal> Implicit<S> {
         f(0, x, &mut self.rate);
         self.stage.copy_from_slice(x);
         for (j, at) in x.iter().enumerate() {
-            let change = DIFFERENCE * at.value().abs().max(1e-3);
-            self.stage[j] = *at + S::of(change);
-            f(0, &self.stage, &mut self.k1);
-            self.stage[j] = *at;
-            for (i, (moved, rate)) in self.k1.iter().zip(&self.rate).enumerate() {
-                let slope = (*moved - *rate).times(S::of(1.0 / change));
-                self.jacobian[(i, j)] = (moved.value() - rate.value()) / change;
-                self.slopes[i * n + j] = slope - S::of(slope.value());
+            let size = at.value().abs().max(1e-3);
+            self.column(j, *at, DIFFERENCE * size, &mut f);
+            // Far from where it settles, and near zero, a state's rate is a difference of large terms. Their rounding must
+            // be small beside the change as well.
+            let slope = self.jacobian[(j, j)];
+            let way = (self.rate[j].value() / slope).abs();
+            if way.is_finite() && way > size {
+                self.column(j, *at, DIFFERENCE * way, &mut f);
+                // Not where the rate is curved.
+                if (self.jacobian[(j, j)] - slope).abs() > CURVED * slope.abs() {
+                    self.column(j, *at, DIFFERENCE * size, &mut f);
+                }
             }
+        }
+    }
+
+    /// The Jacobian's column of the state `j`, which is `at` a value, by a difference.
+    fn column(&mut self, j: usize, at: S, change: f64, f: &mut impl FnMut(usize, &[S], &mut [S])) {
+        let n = self.rate.len();
+        self.stage[j] = at + S::of(change);
+        f(0, &self.stage, &mut self.k1);
+        self.stage[j] = at;
+        for (i, (moved, rate)) in self.k1.iter().zip(&self.rate).enumerate() {
+            let slope = (*moved - *rate).times(S::of(1.0 / change));
+            self.jacobian[(i, j)] = (moved.value() - rate.value()) / change;
+            self.slopes[i * n + j] = slope - S::of(slope.value());
         }
     }
 
@@ -209,6 +229,25 @@ mod tests {
             method.step(&mut x, h, f);
         }
         x
+    }
+
+    /// A heater of 50 J/K that starts at 0 K beside an oven of 965 J/K at 294 K, and gives heat to it quickly.
+    #[test]
+    fn a_state_at_zero_beside_a_large_one_settles() {
+        let mut x = [0.0, 294.0];
+        let f = |_: usize, x: &[f64], dx: &mut [f64]| {
+            let heat = 3e4 * (x[0] - x[1]);
+            dx[0] = -heat / 50.0;
+            dx[1] = heat / 965.0;
+        };
+        let mut method = Implicit::new();
+        method.linearise(&x, f);
+        method.prepare(0.05);
+        for _ in 0..100 {
+            method.step(&mut x, 0.05, f);
+        }
+        let settled = 294.0 * 965.0 / 1015.0;
+        assert!(x.iter().all(|x| (x / settled - 1.0).abs() < 1e-6), "{x:?}");
     }
 
     #[test]
