@@ -12,23 +12,7 @@ pub(crate) fn advice(
 ) -> Vec<Advice> {
     let mut list = Vec::new();
     if let (Conclusion::EffectMissing, Some(best)) = (verdict, best) {
-        for other in &best.indistinguishable_from {
-            list.push(Advice {
-                why: format!(
-                    "these data cannot tell `{}` at {} from `{}` at {}",
-                    best.place.effect,
-                    best.place.at.join(", "),
-                    other.effect,
-                    other.at.join(", ")
-                ),
-                experiment: format!(
-                    "{}; `loopsight experiment MODEL --separate {} {} -o plan.csv` makes it",
-                    separating(&best.place.effect, &other.effect),
-                    named(&best.place),
-                    named(other)
-                ),
-            });
-        }
+        list.extend(to_tell_apart(&best.place, &best.indistinguishable_from));
     }
     if verdict == Conclusion::DataInsufficient {
         let log =
@@ -63,13 +47,43 @@ pub(crate) fn advice(
     list
 }
 
+/// Experiments that tell an effect from those of its class. One of a kind serves several of them: its command is that
+/// for the first, and each reason says which pair it is for.
+pub(crate) fn to_tell_apart(place: &EffectAt, class: &[EffectAt]) -> Vec<Advice> {
+    let mut kinds: Vec<(&str, String)> = Vec::new();
+    let advice = class.iter().map(|other| {
+        let kind = separating(&place.effect, &other.effect);
+        let pair = format!("--separate {} {}", named(place), named(other));
+        let known = kinds.iter().find(|(known, _)| *known == kind);
+        let first = known.map_or_else(|| pair.clone(), |(_, first)| first.clone());
+        let why = format!(
+            "these data cannot tell `{}` at {} from `{}` at {}",
+            place.effect,
+            place.at.join(", "),
+            other.effect,
+            other.at.join(", ")
+        );
+        let why = match first == pair {
+            true => why,
+            false => format!("{why} (`{pair}` for these)"),
+        };
+        let experiment =
+            format!("{kind}; `loopsight experiment MODEL {first} -o plan.csv` makes it");
+        if first == pair {
+            kinds.push((kind, pair));
+        }
+        Advice { why, experiment }
+    });
+    advice.collect()
+}
+
 /// An effect with its channels, as the command `experiment` reads it.
 fn named(place: &EffectAt) -> String {
     format!("{}@{}", place.effect, place.at.join("+"))
 }
 
 /// The experiment that separates two effects.
-fn separating(a: &str, b: &str) -> String {
+fn separating(a: &str, b: &str) -> &'static str {
     let either = |names: &[&str]| names.contains(&a) || names.contains(&b);
     if either(&[
         "input_delay",
@@ -78,13 +92,13 @@ fn separating(a: &str, b: &str) -> String {
         "sensor_lag",
         "sensor_window",
     ]) {
-        "fast steps and a chirp up to the loop's bandwidth, sampled as fast as the sensor allows; for input against sensor delay, disturb the robot by hand: a disturbance passes the sensor only".to_owned()
+        "fast steps and a chirp up to the loop's bandwidth, sampled as fast as the sensor allows; for input against sensor delay, disturb the robot by hand: a disturbance passes the sensor only"
     } else if either(&["elastic_coupling"]) {
-        "a chirp through the frequency at which it rings, small and large, and steps, sampled ten times in each swing: a spring rings at one frequency at any size".to_owned()
+        "a chirp through the frequency at which it rings, small and large, and steps, sampled ten times in each swing: a spring rings at one frequency at any size"
     } else if either(&["hysteresis"]) {
-        "to and fro over ways of several lengths, from one side and from the other, slowly and again faster: a loop of hysteresis is as wide at any speed, and wider over longer ways".to_owned()
+        "to and fro over ways of several lengths, from one side and from the other, slowly and again faster: a loop of hysteresis is as wide at any speed, and wider over longer ways"
     } else if either(&["end_stop", "overflow"]) {
-        "slowly up to the limit and harder against it, several times, and the same range again from the other side".to_owned()
+        "slowly up to the limit and harder against it, several times, and the same range again from the other side"
     } else if either(&[
         "dead_zone",
         "coulomb_friction",
@@ -95,10 +109,10 @@ fn separating(a: &str, b: &str) -> String {
         "pulse_coast",
         "gain_asymmetry",
     ]) {
-        "several levels of the input, slow ramps through zero in both directions, and coasting from speed with the input at zero".to_owned()
+        "several levels of the input, slow ramps through zero in both directions, and coasting from speed with the input at zero"
     } else if either(&["wheel_radius_mismatch", "sensor_scale", "encoder_ripple"]) {
-        "a straight run and turns on the spot in both directions, with the position measured from outside".to_owned()
+        "a straight run and turns on the spot in both directions, with the position measured from outside"
     } else {
-        "inputs of several levels and frequencies, both directions of motion, turns and straight runs".to_owned()
+        "inputs of several levels and frequencies, both directions of motion, turns and straight runs"
     }
 }

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use crate::conclusion::{Conclusion, Diagnosis, EffectAt};
+use crate::advice::to_tell_apart;
+use crate::conclusion::{Advice, Conclusion, Diagnosis, EffectAt};
 use crate::fitted::Fit;
 
 /// One step of an improvement.
@@ -38,4 +39,22 @@ pub struct Improvement {
     /// The best model, fitted to all of the log; none where a diagnosis was refused.
     #[serde(skip)]
     pub best: Option<Fit>,
+}
+
+impl Improvement {
+    /// What to record next: to tell what was added from what the data still cannot tell from it, and what the last diagnosis
+    /// asks for. What earlier rounds asked is settled.
+    pub fn advice(&self) -> Vec<Advice> {
+        let open = self.steps.iter().filter_map(|step| {
+            let place = step.added.as_ref()?;
+            Some(to_tell_apart(place, &step.still_open))
+        });
+        let mut all: Vec<Advice> = open.flatten().collect();
+        for one in self.diagnoses.last().iter().flat_map(|d| &d.advice) {
+            if !all.contains(one) {
+                all.push(one.clone());
+            }
+        }
+        all
+    }
 }

@@ -5,6 +5,8 @@ use loopsight_model::run::Run;
 
 use crate::conclusion::Advice;
 use crate::criteria::LogCriteria;
+use crate::floor::rounding;
+use crate::score::Tally;
 
 /// Whether a measured signal changes in a run.
 fn moves(run: &Run) -> bool {
@@ -45,6 +47,31 @@ pub(crate) fn notes(model: &Model, runs: &[Run]) -> Vec<Advice> {
             })
         })
         .collect()
+}
+
+/// Where every measured signal has so few levels that its steps hide the motion: what the steps are.
+fn too_coarse(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Option<String> {
+    let coarse = |(i, measured): (usize, &loopsight_model::model::MeasuredSignal)| {
+        let mut tally = Tally::default();
+        for run in runs {
+            (0..run.len()).for_each(|k| tally.add(run.sample(k)[i], 0.0));
+        }
+        let (step, std) = (
+            12f64.sqrt() * rounding(&measured.sensor, i, runs),
+            tally.std(),
+        );
+        let unit = measured.signal.unit;
+        (std > 0.0 && step >= criteria.coarse * std).then(|| {
+            format!(
+                "`{}` changes in steps of {step:.2e} {unit}, and its standard deviation is {std:.2e} {unit}",
+                measured.signal.id
+            )
+        })
+    };
+    let found: Option<Vec<String>> = model.measured.iter().enumerate().map(coarse).collect();
+    found
+        .filter(|all| !all.is_empty())
+        .map(|all| all.join("; "))
 }
 
 /// Why a recording does not say enough; empty when it does.
@@ -97,6 +124,12 @@ pub(crate) fn reasons(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Ve
                 "something moves in {moving:.2} s of {duration:.2} s only; in the other runs no measured signal changes"
             ),
             "record runs in which the machine moves, with inputs above its friction, 20 s as a rule",
+        );
+    }
+    if let Some(why) = too_coarse(model, runs, criteria) {
+        say(
+            why,
+            "measure with more counts per turn, or move further and faster, so that a signal has ten levels and more",
         );
     }
     if !runs.iter().any(moves) {

@@ -102,7 +102,10 @@ impl LogMap {
 
 /// A column of a log: its name alone, or with unit and scale.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "the column's name as a string, or a table as `{ column = \"name\", scale = -1.0 }`"
+)]
 pub enum ColumnMap {
     /// The name; the unit is read from its ending.
     Name(String),

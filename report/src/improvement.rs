@@ -1,6 +1,6 @@
 //! The page of an improvement: the error falling, effect by effect.
 
-use loopsight_diagnosis::{Advice, Comparison, Diagnosis, Improvement, ImprovementStep};
+use loopsight_diagnosis::{Comparison, Diagnosis, Improvement, ImprovementStep};
 
 use crate::bars::{Line, Scale};
 use crate::beside::Names;
@@ -83,12 +83,7 @@ pub fn improvement_page(
             &(estimates(&all) + &list(&flat)),
         ));
     }
-    let advised: Vec<Advice> = improvement
-        .diagnoses
-        .iter()
-        .flat_map(|d| d.advice.clone())
-        .collect();
-    body.push_str(&advice(&advised));
+    body.push_str(&advice(&improvement.advice()));
     body.push_str(&section(
         "What to do next",
         "",

@@ -13,6 +13,8 @@ criteria! {
         run_s: f64 = 1.0 "s", Judgement: "a shorter free run is mostly its initial state";
         /// A sensor whose value changes only after this many sampling periods repeats itself in between.
         repeats_periods: f64 = 1.5 "periods", Derived: "half-way between a new value at every sample and at every other";
+        /// Step of a measured signal, over its standard deviation, from which the log has too few levels to tell a motion.
+        coarse: f64 = 1.0 "1", Derived: "rounding then makes a twelfth of the variance, and most of the motion is within one step";
         /// Where a combination of the inputs is below this share of them, the part of the plant that it shows counts as not shown.
         unshown: f64 = 0.1 "1", Derived: "of ten volts one is then left for that part, and the dry friction of a drivetrain hides it";
     }

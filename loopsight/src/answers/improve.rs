@@ -198,7 +198,7 @@ impl ImproveAnswer {
             still_open,
             residual_force: last.and_then(|d| d.residual_force.as_ref()).map(Into::into),
             faults: last.map_or_else(Vec::new, |d| all(&d.faults)),
-            advice: last.map_or_else(Vec::new, |d| all(&d.advice)),
+            advice: all(&engine.advice()),
             observer: last.and_then(|d| d.observer.as_ref()).map(Into::into),
             summary: words::improvement(&engine),
             series: None,

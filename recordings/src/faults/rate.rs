@@ -31,6 +31,8 @@ struct Column {
     dimension: Dimension,
     stem: String,
     shown: String,
+    /// Whether the model uses it.
+    used: bool,
 }
 
 pub(crate) fn check(table: &Table, plan: &Plan) -> Vec<Fault> {
@@ -57,7 +59,14 @@ pub(crate) fn check(table: &Table, plan: &Plan) -> Vec<Fault> {
                 "57.3 times too small: converted to radians twice?",
             )
         } else if UNITY.contains(&-ratio) {
-            (FaultKind::ReversedSign, "of the wrong sign")
+            // Who turns a rate says that its angle is wrong as well, and where nothing uses that, it does not matter.
+            if rate.used && rate.factor < 0.0 && !angle.used {
+                continue;
+            }
+            (
+                FaultKind::ReversedSign,
+                "of the wrong sign (`scale = -1` in the model's [log] turns it)",
+            )
         } else {
             continue;
         };
@@ -108,6 +117,7 @@ fn columns(table: &Table, plan: &Plan) -> Vec<Column> {
             dimension: unit.dimension,
             stem: stem.join("_"),
             shown: used.map_or(&header.text, |(_, signal)| &signal.id).clone(),
+            used: used.is_some(),
         });
     }
     out

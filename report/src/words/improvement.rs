@@ -5,10 +5,11 @@ use loopsight_diagnosis::{Conclusion, EffectAt, Improvement, ImprovementStep, Pa
 use loopsight_model::model::Attached;
 
 use super::diagnosis::{self, Said};
+use super::faults::faults;
 use super::number::{error, hundredths};
 use super::place::{enumerated, place, place_in_brackets, place_in_table};
 use super::table::table;
-use super::{fit, force};
+use super::{advice, fit, force};
 
 /// What an improvement comes to, sentence by sentence; the first alone says the conclusion.
 pub fn summary(improvement: &Improvement) -> Vec<String> {
@@ -210,8 +211,8 @@ fn doubtful(verdict: ParameterVerdict) -> bool {
     )
 }
 
-/// An improvement for a terminal: the error step by step, summary, the force that is missing, and the best
-/// model's parameters.
+/// An improvement for a terminal: faults of the log, the error step by step, summary, the force that is missing, what to
+/// record next, and the best model's parameters.
 pub fn text(improvement: &Improvement) -> String {
     let rows: Vec<Vec<String>> = improvement
         .steps
@@ -227,11 +228,13 @@ pub fn text(improvement: &Improvement) -> String {
             ]
         })
         .collect();
-    let mut text = String::new();
+    let first = improvement.diagnoses.first();
+    let mut text = first.map_or_else(String::new, |d| faults(&d.faults));
     if !rows.is_empty() {
-        text = table(&["step", "fit error", "validation error"], &rows) + "\n";
+        text += &(table(&["step", "fit error", "validation error"], &rows) + "\n");
     }
     text.push_str(&summary(improvement).join("\n"));
+    text.push_str(&advice::lines(&improvement.advice()));
     let last = improvement.diagnoses.last();
     text.push_str(&force::text(last.and_then(|d| d.residual_force.as_ref())));
     if let Some(best) = &improvement.best {
