@@ -26,6 +26,7 @@ const OTHERS: usize = 6;
 const SHORT: Effort = Effort {
     iterations: 12,
     tolerance: 1e-4,
+    worth: None,
 };
 
 /// Where a fit began, and the error it ended with.

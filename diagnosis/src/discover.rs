@@ -17,7 +17,7 @@ pub(crate) fn discovered(
     let first = candidate.model.parameters[own].iter().map(|p| p.value);
     let mut start = nominal.solution.values.clone();
     start.extend(first.collect::<Option<Vec<f64>>>()?);
-    let looked = look(&candidate, &start, nominal)?;
+    let (looked, _) = look(&candidate, &start, nominal, f64::INFINITY)?;
     let (judged, fit) = finish(looked, nominal)?;
     let explanation = explain(&judged, &fit, nominal).ok()?;
     Some((judged, explanation))

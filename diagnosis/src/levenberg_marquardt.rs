@@ -1,6 +1,9 @@
 //! Least squares within bounds: Levenberg–Marquardt with a projected step.
 
+use loopsight_model::model::pseudo_inverse;
 use nalgebra::{DMatrix, DVector};
+
+use crate::solve::Effort;
 
 /// Damping at the start, over the largest diagonal entry of `JᵀJ`.
 const DAMPING: f64 = 1e-6;
@@ -8,6 +11,8 @@ const DAMPING: f64 = 1e-6;
 const STILL: f64 = 1e-10;
 /// Share of the promised gain from which a step is taken.
 const TAKEN: f64 = 1e-4;
+/// A step that gained what it promised, give or take this share, shows that the derivatives hold where it ended.
+const STEADY: f64 = 0.5;
 /// Most times in a row that a damped step is not taken.
 const REFUSED: u32 = 8;
 /// Share of the way to a bound that a step ends at. At a bound of zero an unknown takes the influence of what it is
@@ -31,8 +36,8 @@ pub(crate) trait LeastSquares {
     fn bounds(&self) -> (&DVector<f64>, &DVector<f64>);
 }
 
-/// The unknowns of least squares from `start`, and whether the cost stopped falling before `iterations` ended: an
-/// iteration changed it by less than its share `tolerance`, or no step lowers it.
+/// The unknowns of least squares from `start`, and whether the cost stopped falling before the iterations of the `effort`
+/// ended: an iteration changed it by less than its tolerance, or no step lowers it.
 ///
 /// ```text
 /// (JᵀJ + μ I)_FF p_F = -(Jᵀ(r + J p_B))_F
@@ -44,39 +49,55 @@ pub(crate) trait LeastSquares {
 /// | `p` | the step; one that would take an unknown beyond its bound ends short of it, but the third time in a row that unknown goes there, joins `B`, and the step of the others is computed again |
 /// | `μ` | damping: divided by up to three after a step that lowers the cost as promised, doubled and more after one that does not |
 ///
+/// Derivatives cost several simulations. A short fit, of which the effort says what it is `worth`, needs none at its end: after
+/// a step that gained what it promised, a full step with the derivatives from before it (the simplified Newton correction)
+/// would gain
+///
+/// ```text
+/// rᵀJ (JᵀJ)⁺ Jᵀr
+/// ```
+///
+/// with `r` from after it. Where that is less than the tolerance, the fit ends. Where what it would leave does not come below
+/// what the fit must be worth, it is given up.
+///
 /// The columns of `J` should be of one size. An unknown at its bound does not hold the others back, as it does where one
 /// step length serves all.
 ///
 /// Reference: C. Kanzow, N. Yamashita, M. Fukushima (2004), "Levenberg–Marquardt methods with strong local convergence
 /// properties for solving nonlinear equations with convex constraints", J. Comput. Appl. Math. 172, 375–397; the damping:
-/// H. B. Nielsen (1999), "Damping parameter in Marquardt's method", IMM-REP-1999-05, Technical University of Denmark.
+/// H. B. Nielsen (1999), "Damping parameter in Marquardt's method", IMM-REP-1999-05, Technical University of Denmark; the
+/// simplified correction: P. Deuflhard (2004), "Newton Methods for Nonlinear Problems", Springer, chapters 2 and 4.
 pub(crate) fn minimise<P: LeastSquares>(
     problem: &P,
     start: &DVector<f64>,
-    iterations: u64,
-    tolerance: f64,
+    effort: Effort,
 ) -> Result<(DVector<f64>, bool), P::Error> {
+    let (iterations, tolerance) = (effort.iterations, effort.tolerance);
+    let beyond = |cost: f64| {
+        effort
+            .worth
+            .is_some_and(|worth| cost.max(0.0).sqrt() > worth)
+    };
     let (lower, upper) = problem.bounds();
     let mut x = within(start, lower, upper);
-    let (residual, jacobian) = problem.linearise(&x)?;
-    let mut cost = residual.norm_squared();
-    let mut normal = jacobian.tr_mul(&jacobian);
-    let mut gradient = jacobian.tr_mul(&residual);
-    let mut mu = DAMPING * normal.diagonal().max().max(1.0);
+    let mut at = Linear::of(problem.linearise(&x)?);
+    let mut cost = at.cost;
+    let mut mu = DAMPING * at.normal.diagonal().max().max(1.0);
     let mut growth = 2.0;
     let mut refused = 0;
     let mut pushes = vec![0; x.len()];
     for iteration in 0..iterations {
-        let Some((step, stopped)) = step(&normal, &gradient, mu, [&x, lower, upper], &pushes)
+        let Some((step, stopped)) = step(&at.normal, &at.gradient, mu, [&x, lower, upper], &pushes)
         else {
             return Ok((x, false));
         };
         if step.norm() <= STILL * (x.norm() + STILL) {
             return Ok((x, true));
         }
-        let promised = -(2.0 * gradient.dot(&step) + step.dot(&(&normal * &step)));
+        let promised = -(2.0 * at.gradient.dot(&step) + step.dot(&(&at.normal * &step)));
         let there = within(&(&x + &step), lower, upper);
-        let gained = cost - problem.residual(&there)?.norm_squared();
+        let residual = problem.residual(&there)?;
+        let gained = cost - residual.norm_squared();
         let kept = gained / promised;
         if promised > 0.0 && kept > TAKEN {
             mu *= (1.0 - (2.0 * kept - 1.0).powi(3)).max(1.0 / 3.0);
@@ -85,15 +106,23 @@ pub(crate) fn minimise<P: LeastSquares>(
             for (count, stopped) in pushes.iter_mut().zip(&stopped) {
                 *count = if *stopped { *count + 1 } else { 0 };
             }
-            let settled = gained <= tolerance * cost && !stopped.contains(&true);
+            let held_back = stopped.contains(&true);
+            let settled = gained <= tolerance * cost && !held_back;
             cost -= gained;
             if settled {
                 return Ok((x, true));
             }
+            if effort.worth.is_some() && !held_back && (kept - 1.0).abs() < STEADY {
+                let gain = at.within_reach(&residual);
+                if gain <= tolerance * cost {
+                    return Ok((x, true));
+                }
+                if beyond(cost - gain) {
+                    return Ok((x, false));
+                }
+            }
             if iteration + 1 < iterations {
-                let (residual, jacobian) = problem.linearise(&x)?;
-                normal = jacobian.tr_mul(&jacobian);
-                gradient = jacobian.tr_mul(&residual);
+                at = Linear::of(problem.linearise(&x)?);
             }
         } else {
             refused += 1;
@@ -105,6 +134,36 @@ pub(crate) fn minimise<P: LeastSquares>(
         }
     }
     Ok((x, false))
+}
+
+/// Residuals near a point, as linear functions.
+struct Linear {
+    /// `rᵀr`
+    cost: f64,
+    /// `J`
+    jacobian: DMatrix<f64>,
+    /// `JᵀJ`
+    normal: DMatrix<f64>,
+    /// `Jᵀr`
+    gradient: DVector<f64>,
+}
+
+impl Linear {
+    fn of((residual, jacobian): (DVector<f64>, DMatrix<f64>)) -> Self {
+        Self {
+            normal: jacobian.tr_mul(&jacobian),
+            gradient: jacobian.tr_mul(&residual),
+            cost: residual.norm_squared(),
+            jacobian,
+        }
+    }
+
+    /// What a full step gains, without bounds, from where the residuals are `residual`.
+    fn within_reach(&self, residual: &DVector<f64>) -> f64 {
+        let gradient = self.jacobian.tr_mul(residual);
+        let inverse = pseudo_inverse(&self.normal);
+        inverse.map_or(f64::INFINITY, |i| gradient.dot(&(i * &gradient)))
+    }
 }
 
 /// The nearest point within the bounds.
@@ -171,15 +230,23 @@ fn step(
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
     use std::convert::Infallible;
 
     use super::*;
 
+    const EFFORT: Effort = Effort {
+        iterations: 100,
+        tolerance: 1e-12,
+        worth: None,
+    };
+
     type Function = fn(&DVector<f64>) -> (Vec<f64>, Vec<f64>);
 
-    /// Residuals with their derivatives row by row.
+    /// Residuals with their derivatives row by row, and how often these were asked for.
     struct Given {
         of: Function,
+        linearised: Cell<usize>,
         lower: DVector<f64>,
         upper: DVector<f64>,
     }
@@ -192,6 +259,7 @@ mod tests {
         }
 
         fn linearise(&self, x: &DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>), Infallible> {
+            self.linearised.set(self.linearised.get() + 1);
             let (r, j) = (self.of)(x);
             Ok((
                 DVector::from_vec(r),
@@ -206,9 +274,14 @@ mod tests {
 
     fn solved(of: Function, start: [f64; 2], bounds: [[f64; 2]; 2]) -> (Vec<f64>, bool) {
         let [lower, upper] = [0, 1].map(|k| DVector::from_fn(2, |i, _| bounds[i][k]));
-        let problem = Given { of, lower, upper };
+        let problem = Given {
+            of,
+            linearised: Cell::new(0),
+            lower,
+            upper,
+        };
         let start = DVector::from_row_slice(&start);
-        let Ok((x, settled)) = minimise(&problem, &start, 100, 1e-12);
+        let Ok((x, settled)) = minimise(&problem, &start, EFFORT);
         (x.as_slice().to_vec(), settled)
     }
 
@@ -237,6 +310,54 @@ mod tests {
             (x[0] - 0.5).abs() < 1e-9 && (x[1] - 0.25).abs() < 1e-6,
             "{x:?}"
         );
+    }
+
+    /// A short fit from 0; whether it ended by itself, how far off it ended, and how often derivatives were computed.
+    fn short(of: Function, tolerance: f64, worth: Option<f64>) -> (bool, f64, usize) {
+        let problem = Given {
+            of,
+            linearised: Cell::new(0),
+            lower: DVector::from_element(2, f64::NEG_INFINITY),
+            upper: DVector::from_element(2, f64::INFINITY),
+        };
+        let effort = Effort {
+            tolerance,
+            worth,
+            ..EFFORT
+        };
+        let Ok((x, settled)) = minimise(&problem, &DVector::zeros(2), effort);
+        let off = (x - DVector::from_element(2, 1.0)).norm();
+        (settled, off, problem.linearised.get())
+    }
+
+    /// Slightly bent, and zero at (1, 1) but for a rest of 0.01.
+    fn bent(x: &DVector<f64>) -> (Vec<f64>, Vec<f64>) {
+        let (a, b) = (x[0], x[1]);
+        (
+            vec![a + 0.01 * a * a - 1.01, b - 0.01 * a * b - 0.99, 0.01],
+            vec![1.0 + 0.02 * a, 0.0, -0.01 * b, 1.0 - 0.01 * a, 0.0, 0.0],
+        )
+    }
+
+    #[test]
+    fn a_short_fit_ends_without_derivatives_at_its_end() {
+        let (settled, off, short_of) = short(bent, 1e-3, Some(f64::INFINITY));
+        assert!(settled && off < 1e-3, "{off}");
+        let (settled, _, full) = short(bent, 1e-3, None);
+        assert!(settled && short_of < full, "{short_of} of {full}");
+    }
+
+    /// Beside 100 that nothing removes, the other residual is at most 1.
+    #[test]
+    fn what_cannot_become_good_enough_is_given_up() {
+        let far: Function = |x| {
+            (
+                vec![100.0, x[0].atan() - 1.0],
+                vec![0.0, 0.0, 1.0 / (1.0 + x[0] * x[0]), 0.0],
+            )
+        };
+        assert!(!short(far, 1e-12, Some(50.0)).0);
+        assert!(short(far, 1e-12, Some(101.0)).0 && short(far, 1e-12, None).0);
     }
 
     /// Nearly the same column twice: while the first unknown stays at its bound, the second goes all its way at once.

@@ -112,6 +112,7 @@ const ROUNDS: [f64; 4] = [0.25, 0.5, 1.0, 1.0];
 const ROUND: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
+    worth: None,
 };
 
 /// `model` and `runs` unchanged where the model can be simulated from the inputs alone.

@@ -380,6 +380,7 @@ fn no_worse<T: Send>(
 const CORRECTION: Effort = Effort {
     iterations: 20,
     tolerance: 1e-6,
+    worth: None,
 };
 
 /// The error of a model after a short fit, and the fitted model.

@@ -15,6 +15,9 @@ use crate::promise::Promises;
 use crate::starts::{Extent, first_starts, fresh_starts, starts_from};
 use crate::trial::{Judged, Nominal, finish, look};
 
+/// Short fits that are made to their end whatever they find. They show how far the others have to come.
+const MOST_PROMISING: usize = 4;
+
 /// A candidate by its index, and where to start it from.
 type Attempt = (usize, Vec<f64>);
 
@@ -25,6 +28,15 @@ pub(crate) struct Search<'a> {
     pub(crate) work: &'a Work<'a>,
     /// How late time stamps may be of their own, s.
     pub(crate) shift: f64,
+}
+
+/// The candidates that were looked at.
+struct Looked {
+    /// By their indices.
+    found: Vec<(usize, Judged)>,
+    /// What the best of them leaves. Of the root of its cost and the error that it is ranked by the larger one counts: what
+    /// a fit sees may be easier than the rest of the log, or harder.
+    least: f64,
 }
 
 /// What a search found.
@@ -113,10 +125,10 @@ impl Search<'_> {
         let extent = Extent::of(self.nominal.holdout.runs);
         let fitted = |candidate: &Candidate| {
             let starts = starts_from(candidate, best, extent);
-            let looks = starts
-                .iter()
-                .filter_map(|start| look(&candidate.chosen(start), start, self.nominal));
-            let first = looks.min_by(|a, b| a.error().total_cmp(&b.error()))?;
+            let looks = starts.iter().filter_map(|start| {
+                look(&candidate.chosen(start), start, self.nominal, f64::INFINITY)
+            });
+            let (first, _) = looks.min_by(|(a, _), (b, _)| a.error().total_cmp(&b.error()))?;
             let found = self.finished(first)?;
             (found.0.error() <= near(candidate)).then_some(found)
         };
@@ -147,12 +159,17 @@ impl Search<'_> {
         let (first, mut waiting): (Vec<Attempt>, Vec<Attempt>) =
             promising.iter().cloned().partition(|(i, _)| simple(*i));
         let mut tried: BTreeSet<usize> = first.iter().map(|(i, _)| *i).collect();
-        let mut looked = Vec::new();
-        self.look_at(&first, waiting.len(), &mut looked);
+        let mut looked = Looked {
+            found: Vec::new(),
+            least: f64::INFINITY,
+        };
+        let (most, others) = first.split_at(first.len().min(MOST_PROMISING));
+        self.look_at(most, others.len() + waiting.len(), &mut looked);
+        self.look_at(others, waiting.len(), &mut looked);
         // A candidate that contains another one comes after it, and starts from where that one ended. Where that
         // one failed, it starts from its own best start.
         while !self.work.is_cancelled() {
-            let mut next = self.grown(&looked, &tried, &mut waiting, extent);
+            let mut next = self.grown(&looked.found, &tried, &mut waiting, extent);
             next.append(&mut waiting);
             if next.is_empty() {
                 break;
@@ -160,7 +177,7 @@ impl Search<'_> {
             tried.extend(next.iter().map(|(i, _)| *i));
             self.look_at(&next, 0, &mut looked);
         }
-        looked
+        looked.found
     }
 
     /// The starts that promise most, the best first.
@@ -189,36 +206,48 @@ impl Search<'_> {
         promising.into_iter().map(|(_, attempt)| attempt).collect()
     }
 
-    /// Makes the short fits of some attempts; `waiting` more are to come.
-    fn look_at(&self, attempts: &[Attempt], waiting: usize, looked: &mut Vec<(usize, Judged)>) {
-        let done = AtomicU64::new(looked.len() as u64);
-        let of = (looked.len() + attempts.len() + waiting) as u64;
-        self.work.tell(Stage::FirstLooks, looked.len() as u64, of);
-        let found = attempts.par_iter().filter_map(|(i, start)| {
-            let found = self.look(*i, start);
-            self.tell(Stage::FirstLooks, &done, of);
-            Some((*i, found?))
-        });
-        looked.extend(found.collect::<Vec<_>>());
+    /// Makes the short fits of some attempts; `waiting` more are to come. What cannot come as near to the best so far as a
+    /// finalist must is given up.
+    fn look_at(&self, attempts: &[Attempt], waiting: usize, looked: &mut Looked) {
+        let before = looked.found.len();
+        let done = AtomicU64::new(before as u64);
+        let of = (before + attempts.len() + waiting) as u64;
+        self.work.tell(Stage::FirstLooks, before as u64, of);
+        let worth = self.criteria().behind * looked.least;
+        let found: Vec<(usize, (Judged, f64))> = (attempts.par_iter())
+            .filter_map(|(i, start)| {
+                let found = self.look(*i, start, worth);
+                self.tell(Stage::FirstLooks, &done, of);
+                Some((*i, found?))
+            })
+            .collect();
+        for (i, (judged, left)) in found {
+            looked.least = looked.least.min(left.max(judged.error()));
+            looked.found.push((i, judged));
+        }
     }
 
-    /// A short fit of a candidate, from its start. The plain model is its special case. Where the fit ended well above
-    /// that one, the start was too strong for this machine, and it is made again from next to nothing.
-    fn look(&self, i: usize, start: &[f64]) -> Option<Judged> {
+    /// A short fit of a candidate, from its start, and the root of its cost; given up where that cannot come below `worth`.
+    /// The plain model is its special case. Where the fit ended well above that one, the start was too strong for this
+    /// machine, and it is made again from next to nothing.
+    fn look(&self, i: usize, start: &[f64], worth: f64) -> Option<(Judged, f64)> {
         let candidate = &self.all[i];
-        let found = look(&candidate.chosen(start), start, self.nominal);
+        let found = look(&candidate.chosen(start), start, self.nominal, worth);
         let most = self.criteria().elsewhere * nrmse(self.nominal.rank);
-        if found.as_ref().is_some_and(|found| found.error() <= most) {
+        if found
+            .as_ref()
+            .is_some_and(|(found, _)| found.error() <= most)
+        {
             return found;
         }
         let again = candidate.faint(start).and_then(|faint| {
             let chosen = candidate.chosen(&faint);
-            look(&chosen, &faint, self.nominal)
+            look(&chosen, &faint, self.nominal, worth)
         });
         found
             .into_iter()
             .chain(again)
-            .min_by(|a, b| a.error().total_cmp(&b.error()))
+            .min_by(|(a, _), (b, _)| a.error().total_cmp(&b.error()))
     }
 
     /// Whether a candidate should start from where another one ended. Strong breakaway friction is found when

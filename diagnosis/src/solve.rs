@@ -15,6 +15,8 @@ pub(crate) struct Effort {
     pub(crate) iterations: u64,
     /// Relative change of the cost below which it has converged.
     pub(crate) tolerance: f64,
+    /// Of a short fit, the root of the cost that it must come below to be worth going on with.
+    pub(crate) worth: Option<f64>,
 }
 
 impl Effort {
@@ -22,6 +24,7 @@ impl Effort {
     pub(crate) const FULL: Self = Self {
         iterations: 100,
         tolerance: 1e-9,
+        worth: None,
     };
 }
 
@@ -63,11 +66,7 @@ impl Problem<'_> {
         effort: Effort,
     ) -> Result<(DVector<f64>, bool), FitError> {
         let borrowed = Borrowed(self, effort);
-        let Effort {
-            iterations,
-            tolerance,
-        } = effort;
-        let (solution, settled) = minimise(&borrowed, start, iterations, tolerance)?;
+        let (solution, settled) = minimise(&borrowed, start, effort)?;
         if solution.iter().any(|v| !v.is_finite()) {
             return Err(FitError::Solver(
                 "the parameters became infinite".to_owned(),

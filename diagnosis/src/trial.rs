@@ -18,16 +18,19 @@ use crate::solve::Effort;
 const LOOK: Effort = Effort {
     iterations: 9,
     tolerance: 1e-3,
+    worth: None,
 };
 /// Effort of a finalist.
 pub(crate) const FINAL: Effort = Effort {
     iterations: 16,
     tolerance: 1e-6,
+    worth: None,
 };
 /// That of its second pass, which begins near its end.
 const AGAIN: Effort = Effort {
     iterations: 5,
     tolerance: FINAL.tolerance,
+    worth: None,
 };
 /// Longest integration steps of a look, in steps of the plant.
 pub(crate) const LOOK_STEPS: f64 = 2.0;
@@ -126,12 +129,20 @@ pub(crate) fn positions(candidate: &Candidate, start: &[f64]) -> Option<Position
         .flatten()
 }
 
-/// A quick fit of a candidate from one start, with the nominal initial states where they can be held.
-pub(crate) fn look(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) -> Option<Judged> {
+/// A quick fit of a candidate from one start, with the nominal initial states where they can be held; and the root of the
+/// cost that it ends with. It is given up where that cannot come below `worth`.
+pub(crate) fn look(
+    candidate: &Candidate,
+    start: &[f64],
+    nominal: &Nominal<'_>,
+    worth: f64,
+) -> Option<(Judged, f64)> {
     nominal.work.go_on().ok()?;
     let model = coarse(candidate, LOOK_STEPS);
     let states = &nominal.solution.states;
     let problem = || nominal.problem(&model, nominal.held);
+    let worth = Some(worth);
+    let effort = Effort { worth, ..LOOK };
     let mut start = start.to_vec();
     if let Some(measured) = positions(candidate, &start) {
         let mut problem = problem()?;
@@ -142,10 +153,13 @@ pub(crate) fn look(candidate: &Candidate, start: &[f64], nominal: &Nominal<'_>) 
             let regressed = problem.stride(&start, states, &shape).ok()?;
             start = regressed.unwrap_or(start);
         }
-        start = problem.solve_from(&start, states, LOOK).ok()?.values;
+        start = problem.solve_from(&start, states, effort).ok()?.values;
     }
-    let solution = problem()?.solve_from(&start, states, LOOK).ok()?;
-    Judged::of(candidate.clone(), &model, solution, nominal)
+    let mut problem = problem()?;
+    let solution = problem.solve_from(&start, states, effort).ok()?;
+    let (left, _) = problem.best()?;
+    let judged = Judged::of(candidate.clone(), &model, solution, nominal)?;
+    Some((judged, left))
 }
 
 /// The full fit of a finalist, initial states included, with intervals. A sign is as sharp as the integrator

@@ -113,7 +113,7 @@ criteria! {
         finalists_at_least: usize = 4 "1", Judgement: "a short fit is only roughly right";
         /// Most sets of channels of one effect among these.
         finalists_each: usize = 2 "1", Judgement: "one for all channels together, and one for the best channel";
-        /// Candidates beyond this multiple of the least error after a short fit get no full fit.
+        /// Candidates beyond this multiple of the least error after a short fit get no full fit. A short fit that cannot come below it is given up.
         behind: f64 = 3.0 "1", Judgement: "a short fit is only roughly right, but no worse than this";
         /// A candidate beyond this multiple of the least error is not extended to a larger one.
         worth_growing: f64 = 2.0 "1", Judgement: "a larger one would not make up for that";
