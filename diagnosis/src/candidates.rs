@@ -132,7 +132,7 @@ impl Candidate {
         speeds(false).any(|speed| speed < criteria.clear_of_sign * width)
     }
 
-    /// Whether, at these `values`, the machine is beyond its limits on more of its way than between them. Such a stop
+    /// Whether, at these `values`, the machine is beyond its limits on more of its way than a stop takes. Such a stop
     /// stops nothing: it stands in for a spring, or for another effect of the place.
     pub(crate) fn has_no_way(&self, values: &[f64], criteria: &SearchCriteria) -> bool {
         let beyond = self.own().filter_map(|i| {

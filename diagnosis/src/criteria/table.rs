@@ -142,7 +142,7 @@ criteria! {
         /// The same within which it is on its way there.
         end_region: f64 = 0.3 "1", Convention: "several times that";
         /// What is beyond its stops on more of its way has no stops.
-        end_beyond: f64 = 0.5 "1", Convention: "a machine is more between its stops than in them";
+        end_beyond: f64 = 0.34 "1", Judgement: "rubber that catches an arm takes a third; what stood in for a spring took half";
         /// Share of the time there, or of the times that it came there, which it must be at its end, so that a stop is tried.
         stays_at_end: f64 = 0.25 "1", Judgement: "a motion that passes or turns anywhere is there a sixth of the time";
         /// Share of the time near its end that a single excursion must be on the last quarter of the way, so that a stop is tried.
