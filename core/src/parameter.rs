@@ -73,6 +73,9 @@ pub struct Parameter {
     /// A quantity that its influence is in proportion to, or nearly so: it has none while that stays at zero. Where the
     /// recording does not show that quantity (see [`crate::Unshown::still`]), it is frozen in a fit.
     pub shown_by: Option<Role>,
+    /// A value that its channel never exceeds, as a command never does the supply. Where nothing says how large it is, a
+    /// diagnosis takes the largest of the recording.
+    pub bounds_channel: bool,
 }
 
 impl Parameter {
@@ -101,6 +104,7 @@ impl Parameter {
             limits: None,
             sides: &[],
             shown_by: None,
+            bounds_channel: false,
         }
     }
 
@@ -184,6 +188,12 @@ impl Parameter {
     /// Has no influence while this quantity is zero.
     pub const fn shown_by(mut self, role: Role) -> Self {
         self.shown_by = Some(role);
+        self
+    }
+
+    /// The values of its channel never exceed it.
+    pub const fn bounding_channel(mut self) -> Self {
+        self.bounds_channel = true;
         self
     }
 

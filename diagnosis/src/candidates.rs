@@ -1,6 +1,6 @@
 //! The candidates of a diagnosis: every effect at every channel where it could be added to the model.
 
-use loopsight_core::{Channel, EffectMeta, Parameter, Place, Role};
+use loopsight_core::{EffectMeta, Parameter, Place, Role};
 use loopsight_model::model::{Attached, Model};
 use loopsight_model::registry;
 use loopsight_model::run::Run;
@@ -132,7 +132,7 @@ impl Candidate {
         speeds(false).any(|speed| speed < criteria.clear_of_sign * width)
     }
 
-    /// Whether, at these `values`, the machine is beyond its limits on more of its way than leads to an end. Such a stop
+    /// Whether, at these `values`, the machine is beyond its limits on more of its way than a stop takes. Such a stop
     /// stops nothing: it stands in for a spring, or for another effect of the place.
     pub(crate) fn has_no_way(&self, values: &[f64], criteria: &SearchCriteria) -> bool {
         let beyond = self.own().filter_map(|i| {
@@ -141,7 +141,7 @@ impl Candidate {
             let end = self.ends[limits as usize]?;
             Some(end.share_beyond(*values.get(i)?))
         });
-        beyond.sum::<f64>() > criteria.end_region
+        beyond.sum::<f64>() > criteria.end_beyond
     }
 
     /// Its model with every sign smoothed widely, those of earlier effects included. The derivative of a sharp
@@ -235,6 +235,7 @@ pub(crate) fn candidates(
         observed,
     } = *seen;
     let sign_width = criteria.sign_width;
+    let largest = largest_inputs(model, runs);
     let mut found = Vec::new();
     let possible = |meta: &&EffectMeta| !(model.log.inputs_measured && meta.before_input);
     let known = registry::effects().into_iter().filter(possible);
@@ -282,7 +283,7 @@ pub(crate) fn candidates(
                 for set in *sets {
                     with = with.and_then(|m| m.with_effect(meta.id, set));
                     if let Some(model) = with.as_mut().filter(|_| !own) {
-                        flow = suit(model, rms, sign_width).max(flow);
+                        flow = suit(model, rms, &largest, sign_width).max(flow);
                     }
                 }
                 if let Some(model) = with {
@@ -306,37 +307,54 @@ pub(crate) fn candidates(
     found
 }
 
+/// The largest value of each input of the plant, either way.
+fn largest_inputs(model: &Model, runs: &[Run]) -> Vec<f64> {
+    let of = |i: usize| {
+        let samples = runs
+            .iter()
+            .flat_map(move |run| (0..run.len()).map(move |k| run.input(k)[i]));
+        samples.fold(0.0, |largest: f64, u| largest.max(u.abs()))
+    };
+    (0..model.plant.inputs.len()).map(of).collect()
+}
+
 /// Sets the smoothing width of the last effect of `model` to `sign_width` times the flow in the recording, and
-/// the command that its sizes refer to. Returns the root mean square of the flow at its channels.
-pub(crate) fn suit(model: &mut Model, rms: &[f64], sign_width: f64) -> f64 {
+/// the commands that its sizes refer to: of root mean squares `rms` of the signals, and `largest` inputs. Returns the root
+/// mean square of the flow at its channels.
+pub(crate) fn suit(model: &mut Model, rms: &[f64], largest: &[f64], sign_width: f64) -> f64 {
     let flow = last_rms(model, Role::Flow, rms);
     smooth(model, 1, sign_width * flow);
-    refer(model, rms);
+    refer(model, rms, largest);
     flow
 }
 
-/// Sets what the last effect of `model` refers its commands to: the root mean square of the recording's, to two
-/// digits. The plant's gain keeps its value there, and depends least on the effect.
-fn refer(model: &mut Model, rms: &[f64]) {
+/// Sets what the last effect of `model` refers its commands to, to two digits: the root mean square of the recording's,
+/// where the plant's gain keeps its value and depends least on the effect, or the largest of them where no command can be
+/// above it.
+fn refer(model: &mut Model, rms: &[f64], largest: &[f64]) {
     let Some(effect) = model.effects.last() else {
         return;
     };
-    let command = |c: &&'static Channel| match c.place {
-        Place::Input(i) => model.plant.inputs.get(i),
+    let inputs = effect.at.iter().filter_map(|c| match c.place {
+        Place::Input(i) => Some(i),
         _ => None,
-    };
-    let largest = (effect.at.iter().filter_map(command))
-        .filter_map(|input| rms.get(model.find_signal(input.id).ok()?).copied())
-        .fold(0.0, f64::max);
-    let first = effect.first_parameter;
-    let references: Vec<usize> = (effect.meta.parameters.iter().enumerate())
-        .filter(|(_, declaration)| is_reference(declaration))
-        .map(|(i, _)| first + i)
-        .collect();
-    if largest.is_normal() {
-        for i in references {
-            model.parameters[i].value = format!("{largest:.1e}").parse().ok();
+    });
+    let mut sizes = [0.0f64; 2];
+    for i in inputs {
+        let signal = (model.plant.inputs.get(i)).and_then(|input| model.find_signal(input.id).ok());
+        let rms = signal.and_then(|signal| rms.get(signal));
+        for (size, of) in sizes.iter_mut().zip([rms, largest.get(i)]) {
+            *size = size.max(of.copied().unwrap_or(0.0));
         }
+    }
+    let first = effect.first_parameter;
+    let references: Vec<(usize, f64)> = (effect.meta.parameters.iter().enumerate())
+        .filter(|(_, declaration)| is_reference(declaration))
+        .map(|(i, declaration)| (first + i, sizes[usize::from(declaration.bounds_channel)]))
+        .filter(|(_, size)| size.is_normal())
+        .collect();
+    for (i, size) in references {
+        model.parameters[i].value = format!("{size:.1e}").parse().ok();
     }
 }
 

@@ -9,7 +9,7 @@ use crate::fit::fit;
 use crate::fitted::Fit;
 use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
-use crate::pairs::pair;
+use crate::pairs::{names_a_stand_in, pair};
 use crate::progress::{Cancelled, Work};
 use crate::refine::{
     blurs, estimated, is_undetermined, refine, still_open, take_values, without_step,
@@ -125,7 +125,7 @@ fn worth_adding(
         return Err(Conclusion::NothingMissing);
     }
     // Something is missing, but hardly this.
-    if fell_to >= improve.worth_blurring && stands_in(best.parameters.values()) {
+    if names_a_stand_in(diagnosis, criteria) {
         return Err(Conclusion::UnknownEffect);
     }
     Ok(best.clone())

@@ -8,6 +8,7 @@ use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::Criteria;
 use crate::diagnose::{Aim, Discover, diagnose_for};
 use crate::error::FitError;
+use crate::estimate::stands_in;
 use crate::measurements::Measurements;
 use crate::progress::{Cancelled, Work};
 
@@ -19,7 +20,8 @@ pub(crate) struct Pair {
     pub(crate) second: Diagnosis,
 }
 
-/// Where no effect of the library explains what the model does not: the two that do it best together, if any do.
+/// Where no effect of the library explains what the model does not, or the one that is named stands in for another: the two
+/// that do it best together, if any do.
 ///
 /// The best of the `diagnosis` are taken for granted one after the other, and each model with one of them is diagnosed
 /// again. The second effect is then judged as any other, and both together must lower the validation error by enough
@@ -30,10 +32,10 @@ pub(crate) fn pair(
     aim: Aim,
     work: &Work<'_>,
 ) -> Result<Option<Pair>, Cancelled> {
-    if diagnosis.verdict != Conclusion::UnknownEffect {
+    let criteria = work.criteria();
+    if diagnosis.verdict != Conclusion::UnknownEffect && !names_a_stand_in(diagnosis, criteria) {
         return Ok(None);
     }
-    let criteria = work.criteria();
     let aim = Aim {
         discover: Discover::Never,
         ..aim
@@ -56,6 +58,18 @@ pub(crate) fn pair(
         best = Some((left, Pair { first, second }));
     }
     Ok(best.map(|(_, pair)| pair))
+}
+
+/// Whether what the diagnosis names explains no large part, and only with a parameter at the end of where it is searched.
+pub(crate) fn names_a_stand_in(diagnosis: &Diagnosis, criteria: &Criteria) -> bool {
+    let named = diagnosis
+        .candidates
+        .first()
+        .filter(|_| diagnosis.missing.is_some());
+    named.is_some_and(|best| {
+        best.nrmse >= criteria.improve.worth_blurring * diagnosis.nominal.nrmse
+            && stands_in(best.parameters.values())
+    })
 }
 
 /// The explanations of a diagnosis to begin with: the best that do something, each another response of the machine.

@@ -79,28 +79,28 @@ impl Winding {
     }
 
     /// As [`Winding::torque`] with all switches of its bridge open. The current runs on through the diodes against
-    /// the supply until it ends, and stays zero.
-    ///
-    /// The back-emf is below the supply, so that the diodes do not conduct again.
+    /// the supply until it ends. It stays zero unless the back-emf is above the supply, which drives it through the other
+    /// diodes.
     pub(crate) fn coasting(&self, supply: f64, speed: f64) -> (f64, f64) {
         let motor = &self.motor;
-        let rotor = speed / motor.gear_ratio;
+        let back_emf = motor.back_emf_constant * speed / motor.gear_ratio;
+        if self.current == 0.0 {
+            return self.torque(back_emf.clamp(-supply, supply), speed);
+        }
         let against = -supply * self.current.signum();
-        let settled = (against - motor.back_emf_constant * rotor) / self.resistance;
-        // `i(t) = settled + (current - settled) exp(-t R/L)` is zero after this share of `L/R`.
-        let ends = ((self.current - settled) / -settled).ln();
+        let settled = (against - back_emf) / self.resistance;
+        if settled * self.current >= 0.0 {
+            return self.torque(against, speed);
+        }
+        // `i(t) = settled + (current - settled) exp(-t R/L)` is zero after this share of the step.
         let lasts = self.step * self.resistance / motor.inductance;
-        let (mean, end) = if self.current == 0.0 {
-            (0.0, 0.0)
-        } else if ends.is_finite() && ends < lasts {
-            let passed = settled * ends - (self.current - settled) * (-ends).exp_m1();
-            (passed / lasts, 0.0)
-        } else {
-            let end = settled + (self.current - settled) * self.decay;
-            (settled + (self.current - settled) * self.mean, end)
-        };
-        let torque = motor.torque_constant * mean - motor.rotor_friction * rotor;
-        (torque / motor.gear_ratio, end)
+        let ends = (-self.current / settled).ln_1p() / lasts;
+        if ends >= 1.0 {
+            return self.torque(against, speed);
+        }
+        let (first, _) = self.over(ends, self.current).torque(against, speed);
+        let (rest, end) = self.over(1.0 - ends, 0.0).coasting(supply, speed);
+        (ends * first + (1.0 - ends) * rest, end)
     }
 
     /// As [`Winding::torque`] with the switches closed for the first share `on` of the step, and open after it.
@@ -222,6 +222,25 @@ mod tests {
         let friction = -motor.rotor_friction * 3.0 / motor.gear_ratio.powi(2);
         assert_eq!(end, 0.0);
         assert!((torque / friction - 1.0).abs() < 1e-12);
+    }
+
+    /// Turned faster than the supply drives it a motor brakes through the diodes of its open bridge, whichever way its
+    /// current went before.
+    #[test]
+    fn a_back_emf_above_the_supply_drives_a_current() {
+        let motor = Driven::Twil.parts().0;
+        let (supply, resistance) = (12.0, motor.resistance);
+        let speed = (supply + 3.0) * motor.gear_ratio / motor.back_emf_constant;
+        for started in [0.0, 0.4, -0.4] {
+            let mut winding = Winding::new(motor, None, 1e-4);
+            winding.current = started;
+            for _ in 0..1000 {
+                let (_, end) = winding.coasting(supply, speed);
+                winding.advance(end);
+            }
+            let settled = winding.current * resistance;
+            assert!((settled + 3.0).abs() < 1e-9, "{started} A: {settled} V");
+        }
     }
 
     /// A step of a pulse and a pause is the two one after the other.

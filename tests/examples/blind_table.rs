@@ -70,6 +70,11 @@ the median over the effect's parameters that have an interval, where the truth h
 time constant of 0.1 ms that no model knows of: it is too little to be seen, but delays and lags take it for
 their own, and friction under pseudo-random voltages that reverse at once. `--windings 1e-6` is without.
 
+Two levels say less than seven: after a pseudo-random binary log the exponent of a power law (thermal, tank) and the edge
+of a vessel are known as closely as the log tells, and the multi-level recording asks for more. The error after is then
+up to 1.8 times the floor. With the true value held a fit to the same log leaves the same error: to four digits for the
+exponent, to two per cent for the edge.
+
 ";
 
 /// An error of ten times the signal's own deviation: a model that runs away.

@@ -284,17 +284,19 @@ fn a_teaching_board_has_friction_a_driver_that_coasts_and_a_drift() {
     let Some(found) = improved(Some("teaching_board.toml"), &[log]) else {
         return;
     };
-    assert_eq!(found.added[..2], ["coulomb_friction", "pulse_coast"]);
+    let mut first = found.added[..2].to_vec();
+    first.sort_unstable();
+    assert_eq!(first, ["coulomb_friction", "pulse_coast"]);
     let drifts = ["gain_drift", "friction_drift"];
     assert!(
         drifts.contains(&found.added[2].as_str()),
         "{:?}",
         found.added
     );
-    // On average over the damping of a motor that is driven all the time.
+    // The board's description says 0.5 V. The current that runs on after each pulse costs voltage as well.
     let friction = found.friction();
-    assert!((1.8..2.3).contains(&friction), "{friction} V");
-    assert!(found.last() < 0.105, "{:?}", found.unseen);
+    assert!((0.4..1.5).contains(&friction), "{friction} V");
+    assert!(found.last() < 0.1, "{:?}", found.unseen);
 }
 
 /// A drive whose step forward was made twice, 0.4 s apart: friction, and a measurement that is late. By hand, with the two

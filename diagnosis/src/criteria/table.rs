@@ -141,8 +141,10 @@ criteria! {
         rests_s: f64 = 0.2 "s", Judgement: "in less a machine hardly slows down";
         /// Share of the range of a position within which it is at its end.
         end: f64 = 0.05 "1", Judgement: "a stop gives a little";
-        /// The same within which it is on its way there. What is beyond its stops on more of its way has no stops.
+        /// The same within which it is on its way there.
         end_region: f64 = 0.3 "1", Convention: "several times that";
+        /// What is beyond its stops on more of its way has no stops.
+        end_beyond: f64 = 0.34 "1", Judgement: "rubber that catches an arm takes a third; what stood in for a spring took half";
         /// Share of the time there, or of the times that it came there, which it must be at its end, so that a stop is tried.
         stays_at_end: f64 = 0.25 "1", Judgement: "a motion that passes or turns anywhere is there a sixth of the time";
         /// Share of the time near its end that a single excursion must be on the last quarter of the way, so that a stop is tried.

@@ -379,7 +379,12 @@ impl Side {
         };
         let mut with = model.with_effect(&place.effect, &at).ok_or_else(misfit)?;
         let meta = with.effects.last().map(|e| e.meta).ok_or_else(misfit)?;
-        let flow = suit(&mut with, rms, sign_width);
+        let flow = suit(
+            &mut with,
+            rms,
+            &vec![limit; model.plant.inputs.len()],
+            sign_width,
+        );
         let reach = last_rms(&with, Role::Position, rms).max(last_rms(&with, Role::Head, rms));
         let first = model.parameters.len();
         let on_input = with

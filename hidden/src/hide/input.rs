@@ -4,6 +4,7 @@ use crate::amplifier::{AmplifierParts, Pulses};
 use crate::driven::Driven;
 use crate::driven::Motor;
 use crate::experiment::PERIOD;
+use crate::machine::STEP;
 use crate::motor::{COPPER, Heat};
 use crate::physics::Physics;
 use crate::truth::Concealed;
@@ -79,17 +80,27 @@ pub(super) fn coast(m: &mut Physics, mut of: Concealed) -> Concealed {
         .physical("rotor_friction", friction, "N m s/rad")
 }
 
+/// Length of a pulse and its pause, in steps of integration.
+const PULSES: u32 = 20;
+
 /// Pulses of 500 Hz on the enable pins: in the pauses all switches are open. Below a size of 1 the motor is weaker, as
 /// for [`coast`]. The current runs on for a while after each pulse.
 pub(super) fn pulses(m: &mut Physics, mut of: Concealed) -> Concealed {
     let supply = m.battery.open_circuit;
     each(m, &mut of, |a| {
-        a.pulses = Some(Pulses { supply, period: 20 })
+        a.pulses = Some(Pulses {
+            supply,
+            period: PULSES,
+        })
     });
     let share = weaken(&mut m.motor, of.size);
     let friction = m.motor.rotor_friction;
+    let winding = m.motor.inductance / m.motor.resistance;
+    let period = f64::from(PULSES) * STEP;
+    // At a reference that is the supply; another one is another damping, and other values.
     of.approximate = true;
     of.fitted("share", share, "1")
+        .fitted("run_on", winding / period, "1")
         .physical("reference", supply, "V")
         .physical("rotor_friction", friction, "N m s/rad")
 }

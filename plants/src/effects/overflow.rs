@@ -23,6 +23,9 @@ use loopsight_core::{Effect, EffectMeta, End, Parameter, PlaceKind, Reading, Rea
 /// one: that is an effect of one's own there (`[effect.expression]` at `tank.lower`). The edge is level, and liquid over
 /// it comes to it slowly.
 ///
+/// One inflow that runs over shows one level above the edge. `limit` and `edge` are told apart by inflows of several sizes
+/// only: of two levels of a pump either may be off, by as much as the sensor's resolution hides.
+///
 /// References: G. Poleni (1717), "De motu aquae mixto"; M. C. Potter, D. C. Wiggert (2002), "Mechanics of Fluids", 3rd
 /// edition, section 10.4, sharp-crested weirs; M. Schoukens, J. P. Noël (2017), "Three benchmarks addressing open
 /// challenges in nonlinear system identification", IFAC PapersOnLine 50-1, 446–451, section 3 (tanks that overflow).

@@ -2,8 +2,8 @@
 
 use loopsight_core::{PlaceKind, Shows};
 use loopsight_diagnosis::{
-    Comparison, Diagnosis, ForceDependence, Measurements, ResidualForce, RunTrace, Work, compare,
-    diagnose, residual_force,
+    Comparison, Diagnosis, EffectAt, Explanation, ForceDependence, Measurements, ResidualForce,
+    RunTrace, Work, compare, diagnose, residual_force,
 };
 use loopsight_hidden::{Experiment, Hidden, Recording, catalogue, record};
 use loopsight_model::model::Model;
@@ -41,12 +41,19 @@ pub(crate) fn picture(effect: Hidden) -> Option<Picture> {
     let plain = found.model.as_ref()?;
     let seen = Measurements::new(&runs);
     let before = compare(plain, &seen, &Work::quiet()).ok()?;
-    let best = found.candidates.first()?;
+    // The effect itself, where another one explains this recording as well.
+    let itself = found
+        .candidates
+        .iter()
+        .find(|c| c.place.effect == effect.id());
+    let best = itself.or(found.candidates.first())?;
     let after = compare(&best.model, &seen, &Work::quiet()).ok()?;
 
     let signal = furthest_off(&before)?;
     let stretch = stretch(&before.runs[0], &after.runs[0], signal);
-    let right = with_right_values(plain, &best.model);
+    // A plain model that takes the effect up is right before the fit.
+    let beside = found.missing.as_ref().map_or(&model, |_| &best.model);
+    let right = with_right_values(plain, beside);
     let off = compare(&right, &seen, &Work::quiet()).ok()?;
     let force = residual_force(&right, &runs, &Work::quiet()).ok()?;
     let residual = of_residual(&off.runs[0], furthest_off(&off)?);
@@ -57,7 +64,7 @@ pub(crate) fn picture(effect: Hidden) -> Option<Picture> {
     let over = over.filter(|_| meta.places[0] != PlaceKind::Output);
     let (over, share) = over.unwrap_or(residual);
     let title = format!("{}: {}", robot.name(), log.truth.hidden.first()?.doc);
-    let caption = caption(&log, &found, &before, &after, &over, share);
+    let caption = caption(&log, &found, best, [&before, &after], &over, share);
     Some(Picture {
         svg: symptom_svg(&title, &stretch, &over),
         caption,
@@ -67,22 +74,36 @@ pub(crate) fn picture(effect: Hidden) -> Option<Picture> {
 fn caption(
     log: &Recording,
     found: &Diagnosis,
-    before: &Comparison,
-    after: &Comparison,
+    best: &Explanation,
+    [before, after]: [&Comparison; 2],
     over: &MeanOver,
     share: f64,
 ) -> String {
     let percent = |share: f64| format!("{:.*} %", usize::from(share < 0.1), 100.0 * share);
-    let named = &found.candidates[0].place;
+    let left = percent(before.nrmse);
+    let floor = percent(log.floor());
+    let fitted = if found.missing.is_none() {
+        format!(
+            "The plain model, fitted to this recording, leaves {left} of the signals' deviation, and the resolution of the \
+             sensors {floor}: its own parameters take the effect up, and only another measurement would show it."
+        )
+    } else {
+        let name = |place: &EffectAt| format!("`{}` at {}", place.effect, place.at.join(" and "));
+        let first = &found.candidates[0].place;
+        let as_well = if *first == best.place {
+            String::new()
+        } else {
+            format!(" {} explains it as well.", name(first))
+        };
+        format!(
+            "The plain model, fitted to this recording, leaves {left} of the signals' deviation. With {} it leaves {}; the \
+             resolution of the sensors leaves {floor}.{as_well}",
+            name(&best.place),
+            percent(after.nrmse),
+        )
+    };
     format!(
-        "The plain model, fitted to this recording, leaves {} of the signals' deviation. With `{}` at {} it leaves {}; \
-         the resolution of the sensors leaves {}. Where the model's own parameters are right, the mean over {} accounts for {} of the \
-         variance of the {}.",
-        percent(before.nrmse),
-        named.effect,
-        named.at.join(" and "),
-        percent(after.nrmse),
-        percent(log.floor()),
+        "{fitted} Where the model's own parameters are right, the mean over {} accounts for {} of the variance of the {}.",
         over.quantity,
         percent(share),
         over.label,
