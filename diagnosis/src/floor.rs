@@ -81,16 +81,13 @@ impl<'a> Part<'a> {
             return rows.collect();
         };
         rows.flat_map(|piece| {
-            let start = piece.start;
-            let same = seen[run][piece].chunk_by(|a, b| a == b);
-            let ends = same.scan(start, |end, row| {
-                let start = *end;
-                *end += row.len();
-                Some((start..*end, row[0] == which))
-            });
-            ends.filter(|(_, belongs)| *belongs)
-                .map(|(row, _)| row)
-                .collect::<Vec<_>>()
+            let mut end = piece.start;
+            let rows = seen[run][piece].chunk_by(|a, b| a == b);
+            rows.filter_map(move |row| {
+                let start = end;
+                end += row.len();
+                (row[0] == which).then_some(start..end)
+            })
         })
         .collect()
     }

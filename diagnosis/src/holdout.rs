@@ -207,7 +207,8 @@ pub(crate) struct Judgement {
     pub(crate) rank: Losses,
 }
 
-fn deviations(runs: &[Run], n: usize) -> Vec<f64> {
+/// The standard deviations of the first `n` measured signals.
+pub(crate) fn deviations(runs: &[Run], n: usize) -> Vec<f64> {
     (0..n)
         .map(|signal| {
             let mut tally = Tally::default();

@@ -73,11 +73,6 @@ pub(crate) fn minimise<P: LeastSquares>(
     effort: Effort,
 ) -> Result<(DVector<f64>, bool), P::Error> {
     let (iterations, tolerance) = (effort.iterations, effort.tolerance);
-    let beyond = |cost: f64| {
-        effort
-            .worth
-            .is_some_and(|worth| cost.max(0.0).sqrt() > worth)
-    };
     let (lower, upper) = problem.bounds();
     let mut x = within(start, lower, upper);
     let mut at = Linear::of(problem.linearise(&x)?);
@@ -112,12 +107,15 @@ pub(crate) fn minimise<P: LeastSquares>(
             if settled {
                 return Ok((x, true));
             }
-            if effort.worth.is_some() && !held_back && (kept - 1.0).abs() < STEADY {
+            if let Some(worth) = effort.worth
+                && !held_back
+                && (kept - 1.0).abs() < STEADY
+            {
                 let gain = at.within_reach(&residual);
                 if gain <= tolerance * cost {
                     return Ok((x, true));
                 }
-                if beyond(cost - gain) {
+                if (cost - gain).max(0.0).sqrt() > worth {
                     return Ok((x, false));
                 }
             }

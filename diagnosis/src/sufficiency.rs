@@ -1,12 +1,12 @@
 //! Whether a recording says enough to fit a model to it.
 
-use loopsight_model::model::Model;
+use loopsight_model::model::{MeasuredSignal, Model};
 use loopsight_model::run::Run;
 
 use crate::conclusion::Advice;
 use crate::criteria::LogCriteria;
 use crate::floor::rounding;
-use crate::score::Tally;
+use crate::holdout::deviations;
 
 /// Whether a measured signal changes in a run.
 fn moves(run: &Run) -> bool {
@@ -51,15 +51,9 @@ pub(crate) fn notes(model: &Model, runs: &[Run]) -> Vec<Advice> {
 
 /// Where every measured signal has so few levels that its steps hide the motion: what the steps are.
 fn too_coarse(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Option<String> {
-    let coarse = |(i, measured): (usize, &loopsight_model::model::MeasuredSignal)| {
-        let mut tally = Tally::default();
-        for run in runs {
-            (0..run.len()).for_each(|k| tally.add(run.sample(k)[i], 0.0));
-        }
-        let (step, std) = (
-            12f64.sqrt() * rounding(&measured.sensor, i, runs),
-            tally.std(),
-        );
+    let stds = deviations(runs, model.measured.len());
+    let coarse = |((i, measured), std): ((usize, &MeasuredSignal), f64)| {
+        let step = 12f64.sqrt() * rounding(&measured.sensor, i, runs);
         let unit = measured.signal.unit;
         (std > 0.0 && step >= criteria.coarse * std).then(|| {
             format!(
@@ -68,7 +62,8 @@ fn too_coarse(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Option<Str
             )
         })
     };
-    let found: Option<Vec<String>> = model.measured.iter().enumerate().map(coarse).collect();
+    let signals = model.measured.iter().enumerate().zip(stds);
+    let found: Option<Vec<String>> = signals.map(coarse).collect();
     found
         .filter(|all| !all.is_empty())
         .map(|all| all.join("; "))
