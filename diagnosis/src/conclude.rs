@@ -9,6 +9,7 @@ use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::{Criteria, MissingCriteria};
 use crate::estimate::strength_is_determined;
 use crate::judge::{Losses, advantage, nrmse};
+use crate::plausible::implausible;
 use crate::trial::{Judged, Nominal};
 
 /// Explanations that are reported.
@@ -94,14 +95,17 @@ impl Evidence<'_> {
     }
 
     /// Whether a candidate does better than the plain model on the validation data, with parameters that the log
-    /// determines.
+    /// determines and that can be what they say.
     fn earned(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
         let unseen = advantage(self.unseen, &judged.losses, &self.criteria().window);
         let better = unseen > criteria.beats
             || (unseen > 0.0 && explanation.significance > criteria.certain)
             || self.shown_by_starts(judged, explanation);
-        better && determined(&judged.candidate, explanation, criteria.undetermined)
+        let runs = self.nominal.holdout.runs;
+        better
+            && determined(&judged.candidate, explanation, criteria.undetermined)
+            && implausible(&judged.candidate, &judged.solution.values, runs).is_none()
     }
 
     /// Whether the starts of the runs show the effect. They are not validation data, because the initial state

@@ -7,6 +7,7 @@ use crate::conclusion::{EffectAt, Explanation};
 use crate::estimate::{Estimate, ParameterVerdict};
 use crate::fitted::Fit;
 use crate::judge::{nrmse, significance};
+use crate::plausible::implausible;
 use crate::progress::Cancelled;
 use crate::settings::Method;
 use crate::trial::{Judged, Nominal};
@@ -36,7 +37,15 @@ pub(crate) fn explain(
         parameters: parameters(candidate, &fit.parameters),
         significance: significance.min(MOST),
         indistinguishable_from: Vec::new(),
-        note: note(fit, candidate),
+        note: [note(fit, candidate)]
+            .into_iter()
+            .chain(implausible(
+                candidate,
+                &judged.solution.values,
+                holdout.runs,
+            ))
+            .collect::<Vec<_>>()
+            .join("; "),
         model: fit.model.clone(),
         entries: candidate.entries.clone(),
         nrmse_fit: nrmse(&fitted),

@@ -107,6 +107,7 @@ mod omitted;
 mod output_error;
 mod pairs;
 mod places;
+mod plausible;
 mod positions;
 mod prediction;
 mod problem;

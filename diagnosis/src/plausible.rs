@@ -1,0 +1,112 @@
+//! Whether the size of an effect is possible for what it is said to be.
+
+use loopsight_core::Place;
+use loopsight_model::run::Run;
+
+use crate::candidates::Candidate;
+use crate::positions::Positions;
+
+/// Why, at these `values`, an effect cannot be what it says; none where it can.
+///
+/// An amplifier's offset or dead zone is a small part of what it is commanded. Friction above every command would have held
+/// the machine, and a force above every command that is always the same would have carried it away. Such an effect stands in for
+/// a force of the machine's own, which is as large as its position makes it; so nothing is said of what depends on a position,
+/// as gravity does. It says nothing either of a machine that was never commanded: what was let go moves by itself.
+pub(crate) fn implausible(candidate: &Candidate, values: &[f64], runs: &[Run]) -> Option<String> {
+    if Positions::matter_to(candidate.meta) {
+        return None;
+    }
+    let commands = candidate.at.iter().map(|id| largest(candidate, id, runs));
+    let largest = commands.fold(f64::INFINITY, f64::min);
+    candidate.own().find_map(|i| {
+        let parameter = &candidate.model.parameters[i];
+        let declared = parameter.declaration;
+        let size = declared.unit == "channel" && declared.default == Some(0.0);
+        let value = values.get(i).filter(|_| size && parameter.free)?.abs();
+        (largest > 0.0 && value > largest).then(|| {
+            let (name, unit) = (&parameter.name, &parameter.unit);
+            format!("{name}: {value:.3} {unit} is beyond the largest command, {largest:.3} {unit}")
+        })
+    })
+}
+
+/// The largest command of the input that a channel is of, or of those in its unit where it is an effort; no number is larger
+/// than that of a channel without any.
+fn largest(candidate: &Candidate, id: &str, runs: &[Run]) -> f64 {
+    let plant = candidate.model.plant;
+    let Some(channel) = plant.channels.iter().find(|c| c.id == id) else {
+        return f64::INFINITY;
+    };
+    let acts = |i: usize| match channel.place {
+        Place::Input(of) => of == i,
+        Place::Effort(_) => plant.inputs[i].unit == channel.unit,
+        _ => false,
+    };
+    let inputs = (0..plant.inputs.len()).filter(|i| acts(*i));
+    let commands = inputs.flat_map(|i| {
+        let samples = runs
+            .iter()
+            .flat_map(move |run| (0..run.len()).map(move |k| run.input(k)));
+        samples.filter_map(move |u| u.get(i).map(|u| u.abs()))
+    });
+    let commands = commands.filter(|u| u.is_finite());
+    commands.reduce(f64::max).unwrap_or(f64::INFINITY)
+}
+
+#[cfg(test)]
+mod tests {
+    use loopsight_model::model::Model;
+    use loopsight_plants as _;
+
+    use super::*;
+
+    fn candidate(effect: &str, at: &'static str) -> Candidate {
+        let text = "[plant.arm]\nK_A = -2.0\nK_C = 6.0\nK_G = 40.0\n[log.measured.angle]\n";
+        let model = Model::from_toml("arm.toml", text).unwrap().0;
+        let model = model.with_effect(effect, &[at]).unwrap();
+        Candidate {
+            meta: model.effects[0].meta,
+            at: vec![at],
+            separate: false,
+            replaces: None,
+            flow: 1.0,
+            reach: 1.0,
+            ends: [None; 2],
+            by_position: false,
+            widths: Vec::new(),
+            entries: None,
+            model,
+        }
+    }
+
+    fn run(commands: &[f64]) -> Run {
+        let mut run = Run::empty(1, 1);
+        for (k, u) in commands.iter().enumerate() {
+            run.push(0.01 * k as f64, &[*u], &[0.0]).unwrap();
+        }
+        run
+    }
+
+    #[test]
+    fn what_is_beyond_every_command_is_said_to_be() {
+        let commanded = [run(&[0.0, 3.0, -2.0])];
+        let said = |effect: &str, at: &'static str, size: f64, runs: &[Run]| {
+            let candidate = candidate(effect, at);
+            let mut values = candidate.model.values();
+            values[candidate.own().start] = size;
+            implausible(&candidate, &values, runs)
+        };
+        let offset = said("input_offset", "input", -40.0, &commanded).unwrap();
+        assert_eq!(
+            offset,
+            "input_offset.offset: 40.000 V is beyond the largest command, 3.000 V"
+        );
+        assert!(said("input_offset", "input", 2.9, &commanded).is_none());
+        assert!(said("coulomb_friction", "joint", 18.0, &commanded).is_some());
+        assert!(said("coulomb_friction", "joint", 1.0, &commanded).is_none());
+        // Its position may carry it, it is an acceleration, or nothing was commanded.
+        assert!(said("torque_ripple", "joint", 40.0, &commanded).is_none());
+        assert!(said("coulomb_friction", "load", 18.0, &commanded).is_none());
+        assert!(said("coulomb_friction", "joint", 18.0, &[run(&[0.0; 3])]).is_none());
+    }
+}
