@@ -233,7 +233,7 @@ fn conclude_from(
     let mut verdict = conclude(diagnosis, &finalists, &evidence);
     if verdict == Conclusion::UnknownEffect {
         work.tell(Stage::ResidualForce, 0, 1);
-        let force = residual_force::of_solution(nominal.model, nominal.solution, runs, work)?;
+        let force = residual_force::of_solution(nominal.model, nominal.solution, runs, true, work)?;
         let expression = force.as_ref().and_then(|f| f.expression.as_ref());
         if let Some((judged, explanation)) = expression
             .filter(|_| discovers)

@@ -6,6 +6,9 @@ use crate::explain::explain;
 use crate::residual_force::ForceExpression;
 use crate::trial::{Judged, Nominal, finish, look};
 
+/// Most fits after the first one.
+const PASSES: usize = 6;
+
 /// The `expression`, added to the nominal model, fitted with it and judged as any other candidate. None where no fit
 /// succeeds, or the work was cancelled.
 pub(crate) fn discovered(
@@ -15,10 +18,24 @@ pub(crate) fn discovered(
     let candidate = candidate(expression, nominal)?;
     let own = candidate.own();
     let first = candidate.model.parameters[own].iter().map(|p| p.value);
-    let mut start = nominal.solution.values.clone();
-    start.extend(first.collect::<Option<Vec<f64>>>()?);
-    let (looked, _) = look(&candidate, &start, nominal, f64::INFINITY)?;
-    let (judged, fit) = finish(looked, nominal)?;
+    let first = first.collect::<Option<Vec<f64>>>()?;
+    // Where the model was fitted alone, and where the expression says that its parameters are beside it.
+    let starts = [&nominal.solution.values, &expression.beside];
+    let looked = starts.into_iter().filter_map(|beside| {
+        let start: Vec<f64> = beside.iter().chain(&first).copied().collect();
+        look(&candidate, &start, nominal, f64::INFINITY)
+    });
+    let (looked, _) = looked.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (mut judged, mut fit) = finish(looked, nominal)?;
+    // There is one candidate, and it is far from the model alone: it has the time to arrive.
+    let further = nominal.work.criteria().start.further;
+    for _ in 0..PASSES {
+        let (before, again) = (judged.error(), finish(judged.clone(), nominal));
+        match again.filter(|(again, _)| again.error() < further * before) {
+            Some(better) => (judged, fit) = better,
+            None => break,
+        }
+    }
     let explanation = explain(&judged, &fit, nominal).ok()?;
     Some((judged, explanation))
 }

@@ -22,10 +22,14 @@ type Rates = fn(time: f64, u: &[f64], x: &[f64]) -> Vec<f64>;
 
 /// A machine from first principles, and the model that lacks something.
 struct Machine {
+    /// Time between two samples, s.
+    period: f64,
     inputs: &'static [&'static str],
     /// Mean of the commands, and how far they go from it.
     commands: [f64; 2],
     states: usize,
+    /// Where all of them begin.
+    at_rest: f64,
     /// Which states are measured, and the standard deviation of the noise.
     measured: &'static [usize],
     noise: f64,
@@ -33,14 +37,14 @@ struct Machine {
     model: &'static str,
 }
 
-/// A recording: semi-implicit Euler at 0.1 ms, an integrator that no model uses. States come as speed, position pairs.
-fn record(machine: &Machine, seconds: f64, seed: u64) -> Run {
+/// A recording: semi-implicit Euler at a hundredth of a period, an integrator that no model uses. States come as speed, position pairs.
+fn record(machine: &Machine, samples: usize, seed: u64) -> Run {
     let commands: Vec<Sequence> = (0..)
         .zip(machine.inputs)
         .map(|(i, name)| {
             let levels = Excitation::MultiLevel {
                 amplitude: machine.commands[1],
-                hold_s: 0.5,
+                hold_s: 50.0 * machine.period,
                 levels: 7,
                 seed: seed + i,
                 common: false,
@@ -49,11 +53,11 @@ fn record(machine: &Machine, seconds: f64, seed: u64) -> Run {
         })
         .collect();
     let mut noise = noise(seed);
-    let h = PERIOD / STEPS as f64;
-    let mut x = vec![0.0; machine.states];
+    let h = machine.period / STEPS as f64;
+    let mut x = vec![machine.at_rest; machine.states];
     let mut run = Run::empty(machine.inputs.len(), machine.measured.len());
-    for k in 0..=(seconds / PERIOD) as usize {
-        let time = PERIOD * k as f64;
+    for k in 0..=samples {
+        let time = machine.period * k as f64;
         let commands = commands.iter();
         let u: Vec<f64> = commands
             .map(|c| machine.commands[0] + c.sample(time))
@@ -89,7 +93,7 @@ fn noise(seed: u64) -> impl FnMut() -> f64 {
 /// Improves the machine's model with one recording, judged on another.
 fn discover(machine: &Machine) -> Improvement {
     let model = Model::from_toml("machine", machine.model).unwrap().0;
-    let [log, test] = [1, 20].map(|seed| record(machine, 30.0, seed));
+    let [log, test] = [1, 20].map(|seed| record(machine, 3000, seed));
     let measurements =
         Measurements::new(std::slice::from_ref(&log)).tested_on(Some(std::slice::from_ref(&test)));
     let settings = ImproveSettings { discover: true };
@@ -126,9 +130,11 @@ const AXIS: &str = "[plant.dc_axis]\n[log.measured]\nspeed = { column = \"speed\
 #[ignore = "seconds: `.ci/run` runs it in release"]
 fn the_curve_of_an_amplifier_is_found() {
     let machine = Machine {
+        period: PERIOD,
         inputs: &["voltage"],
         commands: [0.0, 9.0],
         states: 1,
+        at_rest: 0.0,
         measured: &[0],
         noise: 0.02,
         rates: |_, u, x| vec![6.0 * (u[0] + 0.03 * u[0] * u[0]) - 2.0 * x[0]],
@@ -143,9 +149,11 @@ fn the_curve_of_an_amplifier_is_found() {
 #[ignore = "seconds: `.ci/run` runs it in release"]
 fn a_load_that_grows_with_time_is_found() {
     let machine = Machine {
+        period: PERIOD,
         inputs: &["voltage"],
         commands: [0.0, 9.0],
         states: 1,
+        at_rest: 0.0,
         measured: &[0],
         noise: 0.02,
         rates: |t, u, x| vec![6.0 * (u[0] - 0.02 * t) - 2.0 * x[0]],
@@ -155,15 +163,70 @@ fn a_load_that_grows_with_time_is_found() {
     is_found(&discover(&machine), "c * time", &truth);
 }
 
+/// A pendulum against a spring that stiffens, on one side. An offset of twice the largest command was an explanation.
+#[test]
+#[ignore = "seconds: `.ci/run` runs it in release"]
+fn a_spring_on_one_side_is_found() {
+    let machine = Machine {
+        period: PERIOD,
+        inputs: &["voltage"],
+        commands: [0.0, 3.0],
+        states: 2,
+        at_rest: 0.0,
+        measured: &[1],
+        noise: 1e-3,
+        rates: |_, u, x| {
+            let spring = 5.0 * x[1].max(0.0) * x[1];
+            vec![6.0 * (u[0] - spring) - 2.0 * x[0] - 40.0 * x[1].sin(), x[0]]
+        },
+        model: "[plant.arm]\nlevel_angle = 1.5707963267948966\n[log.measured]\nangle = { column = \"angle\" }\n",
+    };
+    let truth = [("discovered.c", -5.0), ("K_G", 40.0), ("K_C", 6.0)];
+    is_found(
+        &discover(&machine),
+        "c * max(position, 0) * position",
+        &truth,
+    );
+}
+
+/// A stove that radiates, read once a second. With a drag that grows with the square of the difference, and nothing more, ten
+/// times the floor was left.
+#[test]
+#[ignore = "seconds: `.ci/run` runs it in release"]
+fn heat_that_is_radiated_is_found() {
+    let machine = Machine {
+        period: 1.0,
+        inputs: &["power"],
+        commands: [60.0, 60.0],
+        states: 2,
+        at_rest: 293.15,
+        measured: &[0, 1],
+        noise: 0.02,
+        rates: |_, u, x| {
+            let radiated = 2e-9 * (x[1].powi(4) - 293.15f64.powi(4));
+            let between = 2.0 * (x[0] - x[1]);
+            vec![
+                (u[0] - between) / 50.0,
+                (between - 0.2 * (x[1] - 293.15) - radiated) / 200.0,
+            ]
+        },
+        model: "[plant.thermal]\n[log.measured]\nheater = { column = \"heater\" }\nbody = { column = \"body\" }\n",
+    };
+    let truth = [("discovered.c", -1e-11), ("loss", 1e-3), ("heating", 0.02)];
+    is_found(&discover(&machine), "c * (body^4 - s^4)", &truth);
+}
+
 /// A contact that corrodes: the current falls by a half per cent each second, whatever drives it. The library knows that:
 /// the gain of the input falls, and so does the part of the damping that is the back-emf's.
 #[test]
 #[ignore = "seconds: `.ci/run` runs it in release"]
 fn a_resistance_that_grows_with_time_is_known() {
     let machine = Machine {
+        period: PERIOD,
         inputs: &["voltage"],
         commands: [0.0, 9.0],
         states: 1,
+        at_rest: 0.0,
         measured: &[0],
         noise: 0.02,
         rates: |t, u, x| vec![(1.0 - 0.005 * t) * (6.0 * u[0] - 1.5 * x[0]) - 0.5 * x[0]],
@@ -190,9 +253,11 @@ fn a_resistance_that_grows_with_time_is_known() {
 #[test]
 fn friction_behind_a_driver_that_coasts_is_found_with_it() {
     let machine = Machine {
+        period: PERIOD,
         inputs: &["voltage"],
         commands: [3.2, 1.6],
         states: 1,
+        at_rest: 0.0,
         measured: &[0],
         noise: 0.02,
         rates: |_, u, x| {
@@ -202,7 +267,7 @@ fn friction_behind_a_driver_that_coasts_is_found_with_it() {
         model: AXIS,
     };
     let model = Model::from_toml("machine", machine.model).unwrap().0;
-    let log = record(&machine, 30.0, 1);
+    let log = record(&machine, 3000, 1);
     let measurements = Measurements::new(std::slice::from_ref(&log));
     let found = diagnose(&model, &measurements, &Work::quiet()).unwrap();
     let best = &found.candidates[0];
@@ -224,9 +289,11 @@ fn friction_behind_a_driver_that_coasts_is_found_with_it() {
 #[test]
 fn a_force_that_depends_on_two_positions_is_found() {
     let machine = Machine {
+        period: PERIOD,
         inputs: &["f1", "f2"],
         commands: [0.0, 9.0],
         states: 4,
+        at_rest: 0.0,
         measured: &[1, 3],
         noise: 5e-4,
         rates: |_, u, x| {

@@ -8,6 +8,9 @@ use crate::progress::{Cancelled, Work};
 
 /// Shortest and longest block, s.
 const BLOCK: (f64, f64) = (0.4, 2.5);
+/// Least samples of a block. Of a plant that is sampled every second fewer would be held out within one and the same motion,
+/// and what their neighbours say of them is no test.
+const SAMPLES: f64 = 40.0;
 /// Blocks in all, about.
 const BLOCKS: f64 = 40.0;
 /// Every so many blocks one is left out of a fit.
@@ -28,7 +31,9 @@ pub(super) struct Blocks {
 /// Block of each sample.
 fn blocks(runs: &[Run]) -> (Vec<usize>, usize) {
     let duration: f64 = runs.iter().map(Run::duration).sum();
-    let length = (duration / BLOCKS).clamp(BLOCK.0, BLOCK.1);
+    let samples: usize = runs.iter().map(Run::len).sum();
+    let least = SAMPLES * duration / samples.max(1) as f64;
+    let length = (duration / BLOCKS).clamp(BLOCK.0, BLOCK.1).max(least);
     let mut all = Vec::new();
     let mut first = 0;
     for run in runs {
@@ -125,6 +130,17 @@ impl Blocks {
         let inverse = Cholesky::new(scaled)?.inverse();
         let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
         Some((&inverse * right, inverse))
+    }
+
+    /// The share of a column's square that `others` cannot make.
+    pub(super) fn own_share(&self, column: usize, others: &[usize]) -> f64 {
+        let columns: Vec<usize> = others.iter().copied().chain([column]).collect();
+        let square: f64 = self.gram.iter().map(|g| g[(column, column)]).sum();
+        let own = self.fit(&columns, None).map(|(_, inverse)| {
+            let last = columns.len() - 1;
+            (inverse[(last, last)] * square).recip()
+        });
+        own.filter(|share| share.is_finite()).unwrap_or(0.0)
     }
 
     /// Best coefficients over all blocks, with standard errors.

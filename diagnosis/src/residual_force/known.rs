@@ -11,6 +11,7 @@ const DRIVE: Variable = Variable::Role(Role::Drive);
 /// What acts in the same way, in words; none where nothing known does.
 pub(super) fn resembles(shape: &Shape) -> Option<&'static str> {
     Some(match shape {
+        Shape::Radiation(..) => "heat that is radiated",
         Shape::One => "a constant load, or an offset",
         Shape::Is(x) => straight(*x)?,
         Shape::Product(a, b) => product(a, b).or_else(|| product(b, a))?,

@@ -60,6 +60,9 @@ pub struct ForceExpression {
     pub share_of_variance: f64,
     /// `[[effect]]` entries for the model file.
     pub toml: String,
+    /// The model's own parameters beside it, where its law is linear: a fit with it may begin there.
+    #[serde(skip)]
+    pub(crate) beside: Vec<f64>,
 }
 
 /// What force is missing from the fitted `model`.
@@ -88,20 +91,23 @@ pub fn residual_force(
         model,
         &Solution { values, states },
         runs,
+        false,
         work,
     )?)
 }
 
-/// As [`residual_force`], from known initial states.
+/// As [`residual_force`], from known initial states. Where something is known to be `missing`, it may be a force that is too slow to
+/// make innovations larger than noise does: it shows in that a filter that follows it is likelier.
 pub(crate) fn of_solution(
     model: &Model,
     solution: &Solution,
     runs: &[Run],
+    missing: bool,
     work: &Work<'_>,
 ) -> Result<Option<ResidualForce>, Cancelled> {
     let criteria = &work.criteria().force;
     let runs = &shortened(runs);
-    let filtered = filter(model, solution, runs, work)?;
+    let (filtered, force) = filter(model, solution, runs, work)?;
     let noise: f64 = filtered.iter().map(|f| f.noise).sum();
     let parameters: Vec<usize> = (0..model.parameters.len())
         .filter(|i| model.parameters[*i].free)
@@ -113,7 +119,8 @@ pub(crate) fn of_solution(
     let spread = noise * (2.0 / bent.innovations.len().max(1) as f64).sqrt();
     let blocks = Blocks::new(&bent, runs, RIDGE, work)?;
     let plain: f64 = blocks.unseen(&known).iter().sum();
-    if plain - noise < criteria.seen * spread {
+    let slow = missing && force > criteria.seen;
+    if plain - noise < criteria.seen * spread && !slow {
         return Ok(None);
     }
 
@@ -138,7 +145,7 @@ pub(crate) fn of_solution(
             let of_terms = chosen.terms.iter().flat_map(|t| &choices[*t].columns);
             let columns: Vec<usize> = known.iter().chain(of_terms).copied().collect();
             let Some(numbers) = sure(&blocks, known.len(), columns.clone(), criteria.sure) else {
-                return Ok(None);
+                continue;
             };
             best = Some(Found {
                 left: blocks.unseen(&columns).iter().sum(),
@@ -184,6 +191,7 @@ pub(crate) fn of_solution(
             force,
             share_of_variance: share,
             toml,
+            beside: bent_by(model, solution, &parameters, bending),
         }
     });
     Ok(Some(ResidualForce {
@@ -198,6 +206,17 @@ pub(crate) fn of_solution(
         depends_on,
         expression,
     }))
+}
+
+/// The values of a `solution`, its free `parameters` changed by `by` as far as their ranges allow.
+fn bent_by(model: &Model, solution: &Solution, parameters: &[usize], by: &[f64]) -> Vec<f64> {
+    let mut values = solution.values.clone();
+    for (i, change) in parameters.iter().zip(by) {
+        values[*i] = model.parameters[*i]
+            .declaration
+            .nearest(values[*i] + change);
+    }
+    values
 }
 
 /// The coefficients of `columns`. Those within the noise become zero, except for the first `known`.

@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use super::filter::Filtered;
 use super::response::{Column, Responses};
 use super::select::Choice;
-use super::shape::{Quantity, Shape, Term, Variable, terms, turns};
+use super::shape::{Quantity, Shape, Term, Variable, both, coldest, terms, turns};
 
 /// Channels of one unit: forces at them are found together.
 #[derive(Clone, Debug)]
@@ -110,6 +110,8 @@ impl Group {
             quantities.push(Quantity {
                 variable,
                 turns: turns(&unit, low, high),
+                both: both(low, high),
+                coldest: coldest(&unit, low, high),
                 unit,
                 rms: (squares / f64::max(n, 1.0)).sqrt(),
             });
@@ -124,6 +126,8 @@ impl Group {
             variable: Variable::Time,
             unit: "s".to_owned(),
             turns: false,
+            both: false,
+            coldest: None,
             rms: (squares / times.len().max(1) as f64).sqrt(),
         });
         for to in &mut series {

@@ -94,9 +94,21 @@ fn batch_of(
     for ((run, x0), filtered) in runs.iter().zip(&solution.states).zip(filtered) {
         let mut simulator = Simulator::new(model, &values);
         let mut rounded = vec![Dual::of(0.0); ny];
+        let nx = model.n_states();
+        let correction = |beyond: &[Dual], k: usize, i: usize| {
+            let innovations = beyond.iter().enumerate();
+            innovations.fold(Dual::of(0.0), |sum, (j, innovation)| {
+                sum + *innovation * Dual::of(filtered.gains[k][(i, j)])
+            })
+        };
         let x0: Vec<Dual> = x0.iter().map(|v| Dual::of(*v)).collect();
         if !run.is_empty() {
             simulator.reset(&x0, run.input(0));
+            simulator.measure(&mut outputs);
+            innovation(run.sample(0), &outputs, &rounded, &mut beyond);
+            for (i, x) in simulator.state_mut().iter_mut().enumerate() {
+                *x += correction(&beyond, 0, i);
+            }
         }
         for k in 1..run.len() {
             work.go_on()?;
@@ -112,20 +124,11 @@ fn batch_of(
             simulator.advance_to(run, k);
             simulator.measure(&mut outputs);
             innovation(run.sample(k), &outputs, &rounded, &mut beyond);
-            let gain = &filtered.gains[k];
-            let correction = |i: usize| {
-                let mut sum = Dual::of(0.0);
-                for (j, innovation) in beyond.iter().enumerate() {
-                    sum += *innovation * Dual::of(gain[(i, j)]);
-                }
-                sum
-            };
-            let nx = model.n_states();
             for (i, x) in simulator.state_mut().iter_mut().enumerate() {
-                *x += correction(i);
+                *x += correction(&beyond, k, i);
             }
             for (i, to) in rounded.iter_mut().enumerate() {
-                *to = correction(nx + i);
+                *to = correction(&beyond, k, nx + i);
             }
             let whitener = &filtered.whiteners[k];
             for i in 0..ny {

@@ -3,6 +3,10 @@
 use super::blocks::{Blocks, gain};
 use crate::progress::{Cancelled, Work};
 
+/// Share of its square from which a term is one of its own: a force that is held over a sample is about a thousandth of itself away
+/// from one that is not.
+const OWN: f64 = 1e-6;
+
 /// A term that may be chosen.
 #[derive(Clone, Debug)]
 pub(super) struct Choice {
@@ -45,11 +49,19 @@ pub(super) fn select(
     // With white residuals of variance 1 a term reduces the sum of squares by the square of its coefficient in
     // standard errors.
     let worth = (criteria.worth * (base - noise)).max(certain * certain);
+    // What the model's own parameters do is no term: only how long a sample is would tell the two apart.
+    let own: Vec<bool> = choices
+        .iter()
+        .map(|choice| {
+            let mut columns = choice.columns.iter();
+            columns.any(|c| blocks.own_share(*c, known) > OWN)
+        })
+        .collect();
     let mut terms: Vec<usize> = Vec::new();
     let mut losses = plain.clone();
     while terms.len() < criteria.most {
         let mut tried: Vec<(usize, f64, f64)> = (0..choices.len())
-            .filter(|t| !terms.contains(t))
+            .filter(|t| own[*t] && !terms.contains(t))
             .map(|t| {
                 work.go_on()?;
                 let with: Vec<usize> = terms.iter().copied().chain([t]).collect();

@@ -25,6 +25,8 @@ pub(super) enum Shape {
     Power(Variable, i32),
     /// `x |x|`.
     SignedSquare(Variable),
+    /// `x⁴ - s⁴`.
+    Radiation(Variable, f64),
     /// `tanh(x/s)`.
     Direction(Variable, f64),
     /// `max(x, 0)` and `min(x, 0)`.
@@ -63,6 +65,7 @@ impl Shape {
             Shape::Magnitude(x) => of(*x).abs(),
             Shape::Power(x, n) => of(*x).powi(*n),
             Shape::SignedSquare(x) => of(*x) * of(*x).abs(),
+            Shape::Radiation(x, around) => of(*x).powi(4) - around.powi(4),
             Shape::Direction(x, scale) => (of(*x) / scale).tanh(),
             Shape::Positive(x) => of(*x).max(0.0),
             Shape::Negative(x) => of(*x).min(0.0),
@@ -72,7 +75,7 @@ impl Shape {
         }
     }
 
-    /// As it stands in an expression; `scale` names the scale of a [`Shape::Direction`].
+    /// As it stands in an expression; `scale` names the number that it contains.
     pub(super) fn text(&self, scale: &mut dyn FnMut(Variable, f64) -> String) -> String {
         let wave = |function: &str, x: &Variable, n: u32| match n {
             1 => format!("{function}({})", x.name()),
@@ -84,6 +87,7 @@ impl Shape {
             Shape::Magnitude(x) => format!("abs({})", x.name()),
             Shape::Power(x, n) => format!("{}^{n}", x.name()),
             Shape::SignedSquare(x) => format!("{0} * abs({0})", x.name()),
+            Shape::Radiation(x, s) => format!("({}^4 - {}^4)", x.name(), scale(*x, *s)),
             Shape::Direction(x, s) => format!("tanh({} / {})", x.name(), scale(*x, *s)),
             Shape::Positive(x) => format!("max({}, 0)", x.name()),
             Shape::Negative(x) => format!("min({}, 0)", x.name()),
@@ -102,6 +106,7 @@ impl Shape {
             }
             Shape::Power(x, n) => vec![(*x, *n)],
             Shape::SignedSquare(x) => vec![(*x, 2)],
+            Shape::Radiation(x, _) => vec![(*x, 4)],
             Shape::Product(a, b) => {
                 let mut all = a.powers();
                 all.extend(b.powers());
@@ -118,6 +123,7 @@ impl Shape {
             | Shape::Magnitude(x)
             | Shape::Power(x, _)
             | Shape::SignedSquare(x)
+            | Shape::Radiation(x, _)
             | Shape::Direction(x, _)
             | Shape::Positive(x)
             | Shape::Negative(x)
@@ -139,6 +145,10 @@ pub(super) struct Quantity {
     pub(super) unit: String,
     /// An angle that makes turns: what depends on it repeats.
     pub(super) turns: bool,
+    /// It has both signs, so each side may act in its own way.
+    pub(super) both: bool,
+    /// The least value of a temperature from absolute zero; none of a difference of temperatures.
+    pub(super) coldest: Option<f64>,
     /// Root mean square in the recording.
     pub(super) rms: f64,
 }
@@ -147,6 +157,13 @@ pub(super) struct Quantity {
 const WAVES: u32 = 6;
 /// Smoothing widths of a direction, as shares of the variable's root mean square.
 const WIDTHS: [f64; 3] = [0.05, 0.2, 0.6];
+
+/// Excursion to one side, over that to the other, up to which it is taken for noise about zero.
+const LEAST_SIDE: f64 = 0.05;
+
+/// Least of a temperature over its largest value from which it counts as measured from absolute zero: a furnace of 1500 K that
+/// was begun at room temperature.
+const COLDEST: f64 = 0.2;
 
 /// Terms that are chosen together: a wave has a cosine and a sine.
 pub(super) type Term = Vec<Shape>;
@@ -167,9 +184,12 @@ pub(super) fn terms(quantities: &[Quantity]) -> Vec<Term> {
         .collect();
     for q in quantities {
         let x = q.variable;
-        let mut singles = vec![Shape::Is(x), Shape::Magnitude(x)];
-        // The sign of a time, or of an angle that makes turns, means nothing.
-        if x != Variable::Time && !q.turns {
+        let mut singles = vec![Shape::Is(x)];
+        if q.both {
+            singles.push(Shape::Magnitude(x));
+        }
+        // The sign of an angle that makes turns means nothing, and what has one sign only has no other side.
+        if q.both && !q.turns {
             singles.extend(WIDTHS.map(|w| Shape::Direction(x, w * q.rms)));
             singles.extend([
                 Shape::SignedSquare(x),
@@ -180,7 +200,12 @@ pub(super) fn terms(quantities: &[Quantity]) -> Vec<Term> {
                 singles.push(half.times(&Shape::Is(x)));
             }
         }
-        singles.extend([Shape::Power(x, 2), Shape::Power(x, 3)]);
+        // What radiates does so with the fourth power of its temperature, and no law has another power of it.
+        // Around it is what it cools down to: about the coldest that it was.
+        match q.coldest {
+            Some(around) => singles.push(Shape::Radiation(x, around)),
+            None => singles.extend([Shape::Power(x, 2), Shape::Power(x, 3)]),
+        }
         all.extend(singles.into_iter().map(|s| vec![s]));
     }
     let waves = |x: Variable, with: &Shape| -> Vec<Term> {
@@ -202,17 +227,17 @@ pub(super) fn terms(quantities: &[Quantity]) -> Vec<Term> {
     }
     if let Some(flow) = flow {
         let x = flow.variable;
-        let direction = Shape::Direction(x, WIDTHS[1] * flow.rms);
+        let direction = (flow.both).then(|| Shape::Direction(x, WIDTHS[1] * flow.rms));
         for q in quantities.iter().filter(|q| q.variable != x) {
-            let mut with = vec![Shape::Is(q.variable), Shape::Magnitude(q.variable)];
-            with.dedup();
-            for factor in with {
-                all.push(vec![direction.times(&factor)]);
+            let magnitude = (q.both).then_some(Shape::Magnitude(q.variable));
+            for factor in std::iter::once(Shape::Is(q.variable)).chain(magnitude) {
+                all.extend(direction.as_ref().map(|d| vec![d.times(&factor)]));
                 all.push(vec![Shape::Is(x).times(&factor)]);
             }
         }
         for angle in &angles {
-            for factor in [direction.clone(), Shape::Is(x), Shape::Magnitude(x)] {
+            let plain = [Shape::Is(x), Shape::Magnitude(x)];
+            for factor in direction.iter().cloned().chain(plain) {
                 all.extend(waves(*angle, &factor));
             }
         }
@@ -232,6 +257,16 @@ pub(super) fn terms(quantities: &[Quantity]) -> Vec<Term> {
         ]);
     }
     all
+}
+
+/// Whether a signal whose extremes are `low` and `high` comes to both sides of zero, and not by noise about it.
+pub(super) fn both(low: f64, high: f64) -> bool {
+    low < 0.0 && high > 0.0 && f64::min(-low, high) > LEAST_SIDE * f64::max(-low, high)
+}
+
+/// The least value of a signal that is a temperature and was never near zero.
+pub(super) fn coldest(unit: &str, low: f64, high: f64) -> Option<f64> {
+    (unit == "K" && low > COLDEST * high).then_some(low)
 }
 
 /// Whether a signal is an angle that made at least about a turn.

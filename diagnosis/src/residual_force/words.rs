@@ -126,10 +126,15 @@ fn draft(name: &str, group: &Group, law: &Law) -> (EffectDraft, String) {
                 unit: unit_of(group, variable),
                 range: Some([value / 10.0, value * 10.0].map(rounded)),
                 held: true,
-                doc: format!(
-                    "width over which the direction of {} counts as turning",
-                    variable.name()
-                ),
+                doc: match shape {
+                    Shape::Radiation(..) => {
+                        format!("temperature of what {} radiates to", variable.name())
+                    }
+                    _ => format!(
+                        "width over which the direction of {} counts as turning",
+                        variable.name()
+                    ),
+                },
             });
             id
         });
