@@ -144,6 +144,7 @@ mod tests {
                 force: "0.25 * flow * cos(2 * position)".into(),
                 share_of_variance: 0.98,
                 toml: "[[effect]]\n[effect.expression]\nat = [\"shaft\"]\n".into(),
+                beside: Vec::new(),
             }),
         }
     }

@@ -64,6 +64,12 @@ fn product(a: &Shape, b: &Shape) -> Option<&'static str> {
         Shape::Is(Variable::Time) | Shape::Magnitude(Variable::Time)
     );
     Some(match a {
+        Shape::Positive(POSITION) | Shape::Negative(POSITION) if *b == Shape::Is(POSITION) => {
+            "a spring on one side that stiffens with its deflection"
+        }
+        Shape::Positive(DRIVE) | Shape::Negative(DRIVE) if *b == Shape::Is(DRIVE) => {
+            "an amplifier or a motor that is stronger to one side"
+        }
         Shape::Is(DRIVE) if time => {
             "a battery that runs down, or a winding that warms up: the input changes its strength with time"
         }
@@ -91,6 +97,13 @@ mod tests {
         let known = resembles(&drive.times(&time)).unwrap_or_default();
         assert!(known.contains("battery"));
         assert_eq!(resembles(&time.times(&drive)), Some(known));
+        let deflection = Shape::Is(POSITION);
+        let known = resembles(&deflection.times(&Shape::Positive(POSITION)));
+        assert!(
+            known
+                .unwrap_or_default()
+                .starts_with("a spring on one side")
+        );
         assert_eq!(resembles(&Shape::Power(DRIVE, 2).times(&time)), None);
     }
 }

@@ -62,7 +62,7 @@ pub struct ForceExpression {
     pub toml: String,
     /// The model's own parameters beside it, where its law is linear: a fit with it may begin there.
     #[serde(skip)]
-    pub(crate) beside: Vec<f64>,
+    pub beside: Vec<f64>,
 }
 
 /// What force is missing from the fitted `model`.

@@ -273,3 +273,37 @@ pub(super) fn coldest(unit: &str, low: f64, high: f64) -> Option<f64> {
 pub(super) fn turns(unit: &str, low: f64, high: f64) -> bool {
     unit == "rad" && high - low > 0.75 * TAU
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(quantity: Quantity) -> Vec<Shape> {
+        terms(&[quantity]).into_iter().flatten().collect()
+    }
+
+    #[test]
+    fn what_has_one_sign_has_no_terms_for_the_other() {
+        let x = Variable::Role(Role::Position);
+        let quantity = |low: f64, high: f64| Quantity {
+            variable: x,
+            unit: "K".to_owned(),
+            turns: false,
+            both: both(low, high),
+            coldest: coldest("K", low, high),
+            rms: high,
+        };
+        let temperature = of(quantity(290.0, 500.0));
+        assert_eq!(
+            temperature,
+            [Shape::One, Shape::Is(x), Shape::Radiation(x, 290.0)]
+        );
+        // A difference of temperatures, with noise about zero, and one with both signs.
+        let warmer = of(quantity(-0.1, 200.0));
+        assert_eq!(warmer.len(), 4, "{warmer:?}");
+        assert!(warmer.contains(&Shape::Power(x, 3)));
+        assert!(of(quantity(-50.0, 200.0)).contains(&Shape::Positive(x)));
+        let out = Shape::Radiation(x, 290.0).value(&|_| 300.0);
+        assert!((out - (300f64.powi(4) - 290f64.powi(4))).abs() < 1.0);
+    }
+}
