@@ -117,6 +117,8 @@ criteria! {
         behind: f64 = 3.0 "1", Judgement: "a short fit is only roughly right, but no worse than this";
         /// A candidate beyond this multiple of the least error is not extended to a larger one.
         worth_growing: f64 = 2.0 "1", Judgement: "a larger one would not make up for that";
+        /// Where no candidate comes below this share of the plain error, the plain fit may have gone astray.
+        astray: f64 = 0.5 "1", Judgement: "an effect that is missing alone explains more; of two, the larger one does";
         /// A larger candidate with more starts than this does not start from where the smaller one ended.
         grown_starts: usize = 3 "1", Judgement: "time";
         /// A candidate is dropped beyond this multiple of the error of the same effect at another channel.
