@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
+use crate::both_ways::is_the_same_both_ways;
 use crate::candidates::Candidate;
 use crate::conclusion::Explanation;
 use crate::criteria::{Criteria, SearchCriteria};
@@ -144,12 +145,14 @@ impl Search<'_> {
     }
 
     /// The full fit of a candidate. An effect whose fitted size is nothing explains nothing, whatever the other
-    /// parameters gained; nor does a shift in time that the stamps may have of their own.
+    /// parameters gained; nor does a shift in time that the stamps may have of their own, nor directions that are alike.
     fn finished(&self, first: Judged) -> Option<(Judged, Explanation)> {
         let (judged, fit) = finish(first, self.nominal)?;
         let explanation = explain(&judged, &fit, self.nominal).ok()?;
-        let least = self.criteria().does_nothing;
-        does_something(&explanation, least, self.shift).then_some((judged, explanation))
+        let criteria = self.work.criteria();
+        let stands_in = is_the_same_both_ways(&judged.candidate, &explanation, criteria);
+        let acts = does_something(&explanation, criteria.search.does_nothing, self.shift);
+        (acts && !stands_in).then_some((judged, explanation))
     }
 
     /// Special cases of the best of `finalists` that ended behind it, fitted anew from where it ended: what it found,

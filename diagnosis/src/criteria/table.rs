@@ -125,6 +125,8 @@ criteria! {
         elsewhere: f64 = 1.1 "1", Judgement: "chance gives less than a tenth";
         /// Share of its noticeable size below which a fitted effect counts as nothing.
         does_nothing: f64 = 0.01 "1", Judgement: "3 mV of friction or 0.1 ms of delay cannot be measured";
+        /// Difference of two directions, as a share of the larger one, below which an effect has no direction.
+        alike: f64 = 0.02 "1", Judgement: "two wheels of one make differ by as much, and nobody would call that a direction";
         /// Share of the plain error below which an effect is also tried with separate parameters at each channel.
         worth_dividing: f64 = 0.8 "1", Judgement: "otherwise it stands in for another effect";
         /// Share of the cost below which a regression at measured positions must come.
