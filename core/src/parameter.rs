@@ -76,6 +76,9 @@ pub struct Parameter {
     /// A value that its channel never exceeds, as a command never does the supply. Where nothing says how large it is, a
     /// diagnosis takes the largest of the recording.
     pub bounds_channel: bool,
+    /// The parameter that means the same in the other direction of motion. Where all such pairs are alike, the effect has no
+    /// direction.
+    pub opposite: Option<&'static str>,
 }
 
 impl Parameter {
@@ -105,6 +108,7 @@ impl Parameter {
             sides: &[],
             shown_by: None,
             bounds_channel: false,
+            opposite: None,
         }
     }
 
@@ -194,6 +198,12 @@ impl Parameter {
     /// The values of its channel never exceed it.
     pub const fn bounding_channel(mut self) -> Self {
         self.bounds_channel = true;
+        self
+    }
+
+    /// Means the same as this parameter, in the other direction of motion.
+    pub const fn opposing(mut self, id: &'static str) -> Self {
+        self.opposite = Some(id);
         self
     }
 

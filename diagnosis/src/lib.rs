@@ -66,6 +66,7 @@
 
 mod advice;
 mod arrive;
+mod both_ways;
 mod candidates;
 #[cfg(test)]
 mod chance;

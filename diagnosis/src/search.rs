@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
+use crate::both_ways::is_the_same_both_ways;
 use crate::candidates::Candidate;
 use crate::conclusion::Explanation;
 use crate::criteria::{Criteria, SearchCriteria};
@@ -55,8 +56,59 @@ impl Search<'_> {
     /// 2. *Look*: the most promising get a fit of a few iterations. A candidate that contains another one starts
     ///    from where that one ended.
     /// 3. *Finish*: the best are fitted until they converge.
+    ///
+    /// All of them begin where the fit of the plain model ended. Where that may have gone astray, they begin a second time from
+    /// the model as it was given: a pendulum that lacks friction swings on, and a fit to that ends anywhere.
     pub(crate) fn run(&self) -> Found {
-        let looked = self.looked_at();
+        let found = self.ended(self.looked_at());
+        if self.work.is_cancelled() || !self.went_astray(&found.finalists) {
+            return found;
+        }
+        let afresh = self.ended(self.looked_at_from_given());
+        let mut finalists = found.finalists;
+        let mut looked = found.looked;
+        looked.extend(afresh.looked);
+        for again in afresh.finalists {
+            let same =
+                |other: &&(Judged, Explanation)| other.0.candidate.is_again(&again.0.candidate);
+            if finalists
+                .iter()
+                .find(same)
+                .is_none_or(|other| again.0.error() < other.0.error())
+            {
+                finalists.retain(|other| !same(&other));
+                finalists.push(again);
+            }
+        }
+        finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
+        Found { finalists, looked }
+    }
+
+    /// Whether the plain model's fit may have ended in another valley than that of the machine: it leaves much, none of
+    /// the `finalists`, which begin where it ended, removes half of that, and the model as it was given is elsewhere.
+    fn went_astray(&self, finalists: &[(Judged, Explanation)]) -> bool {
+        let start = &self.work.criteria().start;
+        let left = nrmse(self.nominal.rank);
+        let helped =
+            least(finalists.iter().map(|(found, _)| found)) < self.criteria().astray * left;
+        left > start.poor && !helped && self.given_is_elsewhere().unwrap_or(false)
+    }
+
+    /// Whether the model as it was given is not where the plain fit ended; none where it lacks values.
+    fn given_is_elsewhere(&self) -> Option<bool> {
+        let given = self.nominal.given;
+        if !given.missing_values().is_empty() {
+            return None;
+        }
+        let problem = self.nominal.problem(given, self.nominal.held)?;
+        let scaled = problem.pack(&given.values(), &self.nominal.solution.states);
+        let cost = problem.residual_vector(&scaled).ok()?.norm_squared();
+        let same = self.work.criteria().choice.never_same;
+        Some(cost.is_nan() || cost > same.powi(2) * self.nominal.cost)
+    }
+
+    /// The best of those that were looked at, fitted until they converge.
+    fn ended(&self, looked: Vec<(usize, Judged)>) -> Found {
         if self.work.is_cancelled() {
             let finalists = Vec::new();
             let looked = best_first(looked);
@@ -93,12 +145,14 @@ impl Search<'_> {
     }
 
     /// The full fit of a candidate. An effect whose fitted size is nothing explains nothing, whatever the other
-    /// parameters gained; nor does a shift in time that the stamps may have of their own.
+    /// parameters gained; nor does a shift in time that the stamps may have of their own, nor directions that are alike.
     fn finished(&self, first: Judged) -> Option<(Judged, Explanation)> {
         let (judged, fit) = finish(first, self.nominal)?;
         let explanation = explain(&judged, &fit, self.nominal).ok()?;
-        let least = self.criteria().does_nothing;
-        does_something(&explanation, least, self.shift).then_some((judged, explanation))
+        let criteria = self.work.criteria();
+        let stands_in = is_the_same_both_ways(&judged.candidate, &explanation, criteria);
+        let acts = does_something(&explanation, criteria.search.does_nothing, self.shift);
+        (acts && !stands_in).then_some((judged, explanation))
     }
 
     /// Special cases of the best of `finalists` that ended behind it, fitted anew from where it ended: what it found,
@@ -177,6 +231,25 @@ impl Search<'_> {
             tried.extend(next.iter().map(|(i, _)| *i));
             self.look_at(&next, 0, &mut looked);
         }
+        looked.found
+    }
+
+    /// All that were looked at from the values of the model as it was given, by their indices. A promise says nothing so far
+    /// from the machine, so each candidate gets a short fit.
+    fn looked_at_from_given(&self) -> Vec<(usize, Judged)> {
+        let extent = Extent::of(self.nominal.holdout.runs);
+        let attempts: Vec<Attempt> = (self.all.iter().enumerate())
+            .filter(|(_, c)| !c.separate && c.replaces.is_none())
+            .filter_map(|(i, c)| {
+                let starts = first_starts(c, self.nominal.given, extent);
+                Some((i, starts.into_iter().next()?))
+            })
+            .collect();
+        let mut looked = Looked {
+            found: Vec::new(),
+            least: f64::INFINITY,
+        };
+        self.look_at(&attempts, 0, &mut looked);
         looked.found
     }
 

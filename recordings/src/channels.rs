@@ -30,6 +30,12 @@ pub(crate) fn prepare(
     signals: &[Signal],
     map: &LogMap,
 ) -> Result<(Table, LogMap), RecordingError> {
+    if log.channels.is_empty() {
+        return Err(RecordingError::NoChannels {
+            log: log.source.as_str().into(),
+            cut: log.cut.as_ref().map(|at| cut(at).into()),
+        });
+    }
     let finder = Finder { log };
     let mut named = map.clone();
     let mut wanted = Wanted::default();

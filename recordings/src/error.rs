@@ -68,6 +68,14 @@ pub enum RecordingError {
         /// Byte in the line, from 1.
         column: usize,
     },
+    /// A log of channels that has none.
+    #[error("{log}: this log has no channels{}", cut.as_deref().map(|cut| format!("; {cut}")).unwrap_or_default())]
+    NoChannels {
+        /// The file.
+        log: Box<str>,
+        /// Where it ends too early, if it does.
+        cut: Option<Box<str>>,
+    },
     /// Neither CSV nor SysId JSON.
     #[error(
         "{log}: unknown format: {found}; expected CSV with a header, or SysId JSON with the keys \"test\" and \"units\""

@@ -89,6 +89,18 @@ fn an_input_holds_and_a_signal_counts_where_it_was_measured() {
     assert_eq!(recording.faults.iter().find(missing), None);
 }
 
+/// The length of the first record is beyond the file.
+#[test]
+fn a_log_without_channels_says_where_it_is_cut() {
+    let mut bytes = two_clocks();
+    bytes[9..17].fill(0xff);
+    let source = read_bytes(&bytes, "two.mcap").unwrap();
+    let error = map(&source, &INPUTS, &SIGNALS, &two_topics()).unwrap_err();
+    let wanted =
+        "two.mcap: this log has no channels; the file ends too early: a record at byte 8 is cut";
+    assert_eq!(error.to_string(), wanted);
+}
+
 /// A driver lets the button go for 0.2 s and pushes it again: that test was made twice, and the robot was somewhere else
 /// in between.
 #[test]

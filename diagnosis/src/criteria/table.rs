@@ -117,12 +117,16 @@ criteria! {
         behind: f64 = 3.0 "1", Judgement: "a short fit is only roughly right, but no worse than this";
         /// A candidate beyond this multiple of the least error is not extended to a larger one.
         worth_growing: f64 = 2.0 "1", Judgement: "a larger one would not make up for that";
+        /// Where no candidate comes below this share of the plain error, the plain fit may have gone astray.
+        astray: f64 = 0.5 "1", Judgement: "an effect that is missing alone explains more; of two, the larger one does";
         /// A larger candidate with more starts than this does not start from where the smaller one ended.
         grown_starts: usize = 3 "1", Judgement: "time";
         /// A candidate is dropped beyond this multiple of the error of the same effect at another channel.
         elsewhere: f64 = 1.1 "1", Judgement: "chance gives less than a tenth";
         /// Share of its noticeable size below which a fitted effect counts as nothing.
         does_nothing: f64 = 0.01 "1", Judgement: "3 mV of friction or 0.1 ms of delay cannot be measured";
+        /// Difference of two directions, as a share of the larger one, below which an effect has no direction.
+        alike: f64 = 0.02 "1", Judgement: "two wheels of one make differ by as much, and nobody would call that a direction";
         /// Share of the plain error below which an effect is also tried with separate parameters at each channel.
         worth_dividing: f64 = 0.8 "1", Judgement: "otherwise it stands in for another effect";
         /// Share of the cost below which a regression at measured positions must come.

@@ -51,7 +51,8 @@ impl Effect for DirectionalFriction {
             Parameter::new("level_backward", "c_b", "channel", "dry friction backwards")
                 .within(0.0, f64::INFINITY)
                 .or(0.0)
-                .scaled(0.3),
+                .scaled(0.3)
+                .opposing("level_forward"),
             Parameter::new(
                 "viscous_forward",
                 "d_f",
@@ -67,7 +68,8 @@ impl Effect for DirectionalFriction {
                 "friction per speed backwards",
             )
             .or(0.0)
-            .scaled(0.1),
+            .scaled(0.1)
+            .opposing("viscous_forward"),
             Parameter::new(
                 "width",
                 "s",
