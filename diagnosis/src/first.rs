@@ -6,6 +6,7 @@ use nalgebra::DVector;
 
 use crate::criteria::{Criteria, StartCriteria};
 use crate::floor::{Part, noise};
+use crate::gram::gram;
 use crate::problem::Problem;
 use crate::progress::Cancelled;
 use crate::window::lags;
@@ -99,7 +100,7 @@ impl Problem<'_> {
             jacobian.row_mut(row).scale_mut(now / *weight);
             *weight = now;
         }
-        let (_, inverse) = self.flat(&jacobian.tr_mul(&jacobian));
+        let (_, inverse) = self.flat(&gram(&jacobian));
         let step = &inverse * jacobian.tr_mul(&residual);
         let variance = residual.norm_squared() / residual.len() as f64;
         let moves = (0..self.free.len())

@@ -3,6 +3,7 @@
 use loopsight_model::model::pseudo_inverse;
 use nalgebra::{DMatrix, DVector};
 
+use crate::gram::gram;
 use crate::solve::Effort;
 
 /// Damping at the start, over the largest diagonal entry of `JᵀJ`.
@@ -149,7 +150,7 @@ struct Linear {
 impl Linear {
     fn of((residual, jacobian): (DVector<f64>, DMatrix<f64>)) -> Self {
         Self {
-            normal: jacobian.tr_mul(&jacobian),
+            normal: gram(&jacobian),
             gradient: jacobian.tr_mul(&residual),
             cost: residual.norm_squared(),
             jacobian,

@@ -92,6 +92,7 @@ mod fit;
 mod fitted;
 mod flatness;
 mod floor;
+mod gram;
 mod growth;
 mod holdout;
 mod improve;

@@ -38,38 +38,16 @@ impl Arma {
                 variance,
             });
         }
-        let cost = |a: f64, c: f64| -> Result<f64, Cancelled> {
-            work.go_on()?;
-            let squares = series
-                .iter()
-                .map(|s| {
-                    let (mut e_before, mut eps) = (0.0, 0.0);
-                    let mut sum = 0.0;
-                    for e in *s {
-                        eps = e - a * e_before - c * eps;
-                        e_before = *e;
-                        sum += eps * eps;
-                    }
-                    sum
-                })
-                .sum();
-            Ok(squares)
-        };
         // The surface is smooth but has a ridge along a = -c: a coarse grid, then a pattern search.
         let mut best = (f64::INFINITY, 0.0, 0.0);
         for a in [-0.6, 0.0, 0.5, 0.9, 0.98] {
-            for c in [-1.0, -0.9, -0.5, 0.0, 0.5] {
-                let value = cost(a, c)?;
-                if value < best.0 {
-                    best = (value, a, c);
-                }
-            }
+            let points = [-1.0, -0.9, -0.5, 0.0, 0.5].map(|c| (a, c));
+            best = least(series, points, best, work)?;
         }
         let mut step: f64 = 0.2;
         while step > 1e-4 {
             let (_, a, c) = best;
-            let mut better = best;
-            for (da, dc) in [
+            let points = [
                 (1., 0.),
                 (-1., 0.),
                 (0., 1.),
@@ -78,14 +56,13 @@ impl Arma {
                 (-1., -1.),
                 (1., -1.),
                 (-1., 1.),
-            ] {
-                let a = (a + da * step).clamp(-LARGEST_A, LARGEST_A);
-                let c = (c + dc * step).clamp(-1.0, 0.99);
-                let value = cost(a, c)?;
-                if value < better.0 {
-                    better = (value, a, c);
-                }
-            }
+            ];
+            let points = points.map(|(da, dc)| {
+                let a: f64 = a + da * step;
+                let c: f64 = c + dc * step;
+                (a.clamp(-LARGEST_A, LARGEST_A), c.clamp(-1.0, 0.99))
+            });
+            let better = least(series, points, best, work)?;
             if better.0 < best.0 {
                 best = better;
             } else {
@@ -127,12 +104,58 @@ impl Arma {
     }
 }
 
+/// The least sum of squares `Σ ε²` with its `a` and `c`: that of `best`, or of some points.
+///
+/// All points are computed in one pass, side by side: each waits for its last `ε`, and the machine computes the others
+/// meanwhile.
+fn least<const N: usize>(
+    series: &[&[f64]],
+    points: [(f64, f64); N],
+    mut best: (f64, f64, f64),
+    work: &Work<'_>,
+) -> Result<(f64, f64, f64), Cancelled> {
+    work.go_on()?;
+    let mut squares = [0.0; N];
+    for s in series {
+        let (mut e_before, mut eps, mut sums) = (0.0, [0.0; N], [0.0; N]);
+        for e in *s {
+            for (((a, c), eps), sum) in points.iter().zip(&mut eps).zip(&mut sums) {
+                *eps = e - a * e_before - c * *eps;
+                *sum += *eps * *eps;
+            }
+            e_before = *e;
+        }
+        for (all, sum) in squares.iter_mut().zip(sums) {
+            *all += sum;
+        }
+    }
+    for (value, (a, c)) in squares.into_iter().zip(points) {
+        if value < best.0 {
+            best = (value, a, c);
+        }
+    }
+    Ok(best)
+}
+
 /// Residuals and sensitivities of one signal in one run.
 pub(crate) struct Block {
     /// Residuals by sample.
     pub(crate) residual: Vec<f64>,
     /// Sensitivities: samples × unknowns, weighted as in the fit.
     pub(crate) jacobian: DMatrix<f64>,
+}
+
+/// The noise model of each of so many signals, whose residuals are in the blocks of some runs.
+pub(crate) fn models(
+    runs: &[Vec<Block>],
+    n_signals: usize,
+    work: &Work<'_>,
+) -> Result<Vec<Arma>, Cancelled> {
+    let of_signal = |signal: usize| {
+        let series = runs.iter().map(|blocks| &*blocks[signal].residual);
+        Arma::fit(&series.collect::<Vec<_>>(), work)
+    };
+    (0..n_signals).map(of_signal).collect()
 }
 
 /// Covariance of a least-squares estimate when the noise of the signals is coloured:
@@ -152,23 +175,16 @@ pub(crate) struct Block {
 /// prewhitening as D. W. K. Andrews, J. C. Monahan, 1992, Econometrica 60, 953–966, scores and
 /// window as W. K. Newey, K. D. West, 1987, Econometrica 55, 703–708.)
 ///
-/// `inverse_gram` is `(JᵀJ)⁻¹` or its pseudo-inverse; each run has one block per signal.
+/// `inverse_gram` is `(JᵀJ)⁻¹` or its pseudo-inverse; each run has one block per signal, and each signal its model among
+/// the `models` of the noise.
 pub(crate) fn covariance(
     runs: &[Vec<Block>],
-    n_signals: usize,
+    models: &[Arma],
     inverse_gram: &DMatrix<f64>,
     unknowns: usize,
     work: &Work<'_>,
 ) -> Result<DMatrix<f64>, Cancelled> {
-    let models: Vec<Arma> = (0..n_signals)
-        .map(|signal| {
-            let series: Vec<&[f64]> = runs
-                .iter()
-                .map(|blocks| blocks[signal].residual.as_slice())
-                .collect();
-            Arma::fit(&series, work)
-        })
-        .collect::<Result<_, Cancelled>>()?;
+    let n_signals = models.len();
     let samples: usize = runs.iter().flatten().map(|b| b.residual.len()).sum();
     let per_signal = samples / n_signals.max(1);
     let criteria = &work.criteria().window;
@@ -176,28 +192,38 @@ pub(crate) fn covariance(
     let columns = inverse_gram.ncols();
     let mut meat = DMatrix::<f64>::zeros(columns, columns);
     for blocks in runs {
+        // The initial states of the other runs move nothing here.
+        let moves = |column: &usize| {
+            let mut blocks = blocks.iter();
+            blocks.any(|block| block.jacobian.column(*column).iter().any(|v| *v != 0.0))
+        };
+        let own: Vec<usize> = (0..columns).filter(moves).collect();
         // One column per sample.
-        let mut scores = DMatrix::<f64>::zeros(columns, blocks[0].residual.len());
-        for (block, model) in blocks.iter().zip(&models) {
-            let mut h = block.jacobian.clone();
-            for mut column in h.column_iter_mut() {
-                model.transpose(column.as_mut_slice());
-            }
-            for (k, eps) in model.whiten(&block.residual).iter().enumerate() {
-                for column in 0..columns {
-                    scores[(column, k)] += h[(k, column)] * eps;
+        let mut scores = DMatrix::<f64>::zeros(own.len(), blocks[0].residual.len());
+        for (block, model) in blocks.iter().zip(models) {
+            let white = model.whiten(&block.residual);
+            for (mut row, column) in scores.row_iter_mut().zip(&own) {
+                let mut h = block.jacobian.column(*column).into_owned();
+                model.transpose(h.as_mut_slice());
+                for ((score, h), eps) in row.iter_mut().zip(h.iter()).zip(&white) {
+                    *score += h * eps;
                 }
             }
         }
         let n = scores.ncols();
-        meat += &scores * scores.transpose();
+        let mut products = &scores * scores.transpose();
         for lag in 1..=lags.min(n.saturating_sub(1)) {
             work.go_on()?;
             let weight = bartlett(lag, lags);
             let product =
                 scores.columns(lag, n - lag) * scores.columns(0, n - lag).transpose() * weight;
-            meat += product.transpose();
-            meat += product;
+            products += product.transpose();
+            products += product;
+        }
+        for (i, row) in own.iter().enumerate() {
+            for (j, column) in own.iter().enumerate() {
+                meat[(*row, *column)] += products[(i, j)];
+            }
         }
     }
     // Degrees of freedom that the fit has used up.

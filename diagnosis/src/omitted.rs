@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::noise;
+use crate::noise::{self, Arma};
 use crate::problem::Problem;
 use crate::progress::Cancelled;
 
@@ -80,7 +80,7 @@ impl Omitted {
 impl Problem<'_> {
     /// How the unknowns would change with what the model leaves out, and how much of it the log allows.
     ///
-    /// With the residual `r` and its Jacobian `J` at the solution, and the change `d = ∂r/∂δ` of the residuals with what
+    /// With the residual `r`, the models of its `noise`, and its Jacobian `J` at the solution, and the change `d = ∂r/∂δ` of the residuals with what
     /// is left out, a small `δ` changes the unknowns by
     ///
     /// ```text
@@ -95,7 +95,7 @@ impl Problem<'_> {
     pub(crate) fn omitted(
         &self,
         omission: &Omission,
-        residual: &DVector<f64>,
+        (residual, noise): (&DVector<f64>, &[Arma]),
         jacobian: &DMatrix<f64>,
         inverse: &DMatrix<f64>,
     ) -> Result<Option<Omitted>, Cancelled> {
@@ -112,8 +112,7 @@ impl Problem<'_> {
             let column = DMatrix::from_column_slice(beside.len(), 1, beside.as_slice());
             let inverse = DMatrix::from_element(1, 1, 1.0 / left);
             let blocks = self.blocks(residual, &column);
-            let n_signals = self.model.measured.len();
-            let variance = noise::covariance(&blocks, n_signals, &inverse, 1, &self.work)?[(0, 0)];
+            let variance = noise::covariance(&blocks, noise, &inverse, 1, &self.work)?[(0, 0)];
             allowed(found, variance.max(0.0).sqrt(), *known)
         } else {
             Some(*known)

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::arrive::{Arrived, Convergence};
 use crate::error::FitError;
 use crate::fitted::Fit;
+use crate::gram::gram;
 use crate::noise;
 use crate::observer::{attach_observer_for, growth};
 use crate::prediction::InitialStates;
@@ -262,12 +263,15 @@ impl Problem<'_> {
     pub(crate) fn result(&self, solution: &DVector<f64>) -> Result<Fit, Cancelled> {
         let (residual, mut jacobian) = self.linearise(solution)?;
         limit_rows(&mut jacobian, self.work.criteria().parameters.steep);
-        let (flatness, inverse) = self.flat(&jacobian.tr_mul(&jacobian));
+        let (flatness, inverse) = self.flat(&gram(&jacobian));
         let blocks = self.blocks(&residual, &jacobian);
         let (signals, unknowns) = (self.model.measured.len(), jacobian.ncols());
-        let mut covariance = noise::covariance(&blocks, signals, &inverse, unknowns, &self.work)?;
+        let noise = noise::models(&blocks, signals, &self.work)?;
+        let mut covariance = noise::covariance(&blocks, &noise, &inverse, unknowns, &self.work)?;
         for omission in self.omissions(solution)? {
-            if let Some(omitted) = self.omitted(&omission, &residual, &jacobian, &inverse)? {
+            if let Some(omitted) =
+                self.omitted(&omission, (&residual, &noise), &jacobian, &inverse)?
+            {
                 omitted.widen(&mut covariance);
             }
         }

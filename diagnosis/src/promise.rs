@@ -15,6 +15,7 @@ use loopsight_model::model::pseudo_inverse;
 use nalgebra::DMatrix;
 
 use crate::candidates::Candidate;
+use crate::gram::gram;
 use crate::positions::Positions;
 use crate::prediction::Solution;
 use crate::problem::Problem;
@@ -131,7 +132,7 @@ impl<'a> Promises<'a> {
         let mut problem = nominal.problem(&model, nominal.held)?;
         problem.positions = at.cloned();
         let (_, jacobian) = problem.linearise(&problem.pack(values, states)).ok()?;
-        let gram = jacobian.tr_mul(&jacobian);
+        let gram = gram(&jacobian);
         gram.iter().all(|v| v.is_finite()).then(|| Linear {
             positions: at.cloned(),
             first: problem.first.clone(),

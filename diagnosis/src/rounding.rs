@@ -16,17 +16,12 @@ impl Problem<'_> {
         let blocks = self.blocks(&residual, &jacobian);
         let criteria = &self.work.criteria().parameters;
         let n_signals = self.weights.len();
-        let rounding: Vec<f64> = (0..n_signals)
-            .map(|signal| {
-                let series: Vec<&[f64]> = blocks
-                    .iter()
-                    .map(|b| b[signal].residual.as_slice())
-                    .collect();
-                let model = noise::Arma::fit(&series, &self.work)?;
+        let rounding: Vec<f64> = (noise::models(&blocks, n_signals, &self.work)?.iter())
+            .map(|model| {
                 let rounded = model.c < criteria.rounded && model.a.abs() < criteria.rounded_slow;
-                Ok(if rounded { model.c } else { 0.0 })
+                if rounded { model.c } else { 0.0 }
             })
-            .collect::<Result<_, Cancelled>>()?;
+            .collect();
         if rounding.iter().all(|c| *c == 0.0) {
             return Ok(None);
         }
