@@ -16,22 +16,18 @@ pub(crate) fn is_the_same_both_ways(
     criteria: &Criteria,
 ) -> bool {
     let own = candidate.own();
-    let each = candidate.meta.parameters.len().max(1);
+    let each = candidate.meta.parameters.len();
     let instance = |i: usize| (i - own.start) / each;
     let declared = |i: usize| candidate.model.parameters[i].declaration;
     let estimate = |i: usize| explanation.parameters.get(&candidate.name(i));
-    let mut pairs = own.clone().filter_map(|i| {
+    let pairs = own.clone().filter_map(|i| {
         let opposite = declared(i).opposite?;
         let j =
             (own.clone()).find(|j| instance(*j) == instance(i) && declared(*j).id == opposite)?;
         Some((estimate(i)?, estimate(j)?))
     });
-    let mut any = false;
-    let alike = pairs.all(|(a, b)| {
-        any = true;
-        are_alike(a, b, criteria)
-    });
-    any && alike
+    let mut alike = pairs.map(|(a, b)| are_alike(a, b, criteria)).peekable();
+    alike.peek().is_some() && alike.all(|alike| alike)
 }
 
 /// Whether two directions are the same.

@@ -308,7 +308,7 @@ pub(crate) fn candidates(
 }
 
 /// The largest value of each input of the plant, either way.
-fn largest_inputs(model: &Model, runs: &[Run]) -> Vec<f64> {
+pub(crate) fn largest_inputs(model: &Model, runs: &[Run]) -> Vec<f64> {
     let of = |i: usize| {
         let samples = runs
             .iter()

@@ -9,7 +9,6 @@ use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::{Criteria, MissingCriteria};
 use crate::estimate::strength_is_determined;
 use crate::judge::{Losses, advantage, nrmse};
-use crate::plausible::implausible;
 use crate::trial::{Judged, Nominal};
 
 /// Explanations that are reported.
@@ -102,10 +101,9 @@ impl Evidence<'_> {
         let better = unseen > criteria.beats
             || (unseen > 0.0 && explanation.significance > criteria.certain)
             || self.shown_by_starts(judged, explanation);
-        let runs = self.nominal.holdout.runs;
         better
             && determined(&judged.candidate, explanation, criteria.undetermined)
-            && implausible(&judged.candidate, &judged.solution.values, runs).is_none()
+            && explanation.implausible.is_none()
     }
 
     /// Whether the starts of the runs show the effect. They are not validation data, because the initial state

@@ -70,6 +70,9 @@ pub struct Explanation {
     pub indistinguishable_from: Vec<EffectAt>,
     /// What to know about it.
     pub note: String,
+    /// Why it cannot be what it says, as the note says too; none where it can.
+    #[serde(skip)]
+    pub implausible: Option<String>,
     /// The model with it, fitted.
     #[serde(skip)]
     pub model: Model,

@@ -30,6 +30,7 @@ pub(crate) fn explain(
         &judged.rank,
         nominal.work,
     )?;
+    let implausible = implausible(candidate, &judged.solution.values, holdout.runs);
     Ok(Explanation {
         place: place(candidate),
         together_with: None,
@@ -37,15 +38,8 @@ pub(crate) fn explain(
         parameters: parameters(candidate, &fit.parameters),
         significance: significance.min(MOST),
         indistinguishable_from: Vec::new(),
-        note: [note(fit, candidate)]
-            .into_iter()
-            .chain(implausible(
-                candidate,
-                &judged.solution.values,
-                holdout.runs,
-            ))
-            .collect::<Vec<_>>()
-            .join("; "),
+        note: note(fit, candidate, implausible.as_ref()),
+        implausible,
         model: fit.model.clone(),
         entries: candidate.entries.clone(),
         nrmse_fit: nrmse(&fitted),
@@ -65,7 +59,8 @@ pub(crate) fn explain_look(judged: &Judged) -> Explanation {
         parameters: parameters(candidate, &fit.parameters),
         significance: f64::NAN,
         indistinguishable_from: Vec::new(),
-        note: note(&fit, candidate),
+        note: note(&fit, candidate, None),
+        implausible: None,
         model: fit.model,
         entries: candidate.entries.clone(),
         nrmse_fit: f64::NAN,
@@ -100,7 +95,7 @@ fn parameters(
 }
 
 /// What to know about a fitted explanation.
-fn note(fit: &Fit, candidate: &Candidate) -> String {
+fn note(fit: &Fit, candidate: &Candidate, implausible: Option<&String>) -> String {
     let mut words = vec![candidate.meta.symptom.to_owned()];
     if let Some((simpler, _)) = &candidate.replaces {
         words.push(format!("in place of {simpler}, which it contains"));
@@ -113,5 +108,6 @@ fn note(fit: &Fit, candidate: &Candidate) -> String {
             words.push(format!("{name}: {}", estimate.verdict.text()));
         }
     }
+    words.extend(implausible.cloned());
     words.join("; ")
 }

@@ -80,8 +80,8 @@ impl Omitted {
 impl Problem<'_> {
     /// How the unknowns would change with what the model leaves out, and how much of it the log allows.
     ///
-    /// With the residual `r`, the models of its `noise`, and its Jacobian `J` at the solution, and the change `d = ∂r/∂δ` of the residuals with what
-    /// is left out, a small `δ` changes the unknowns by
+    /// With the residual `r`, the models of its `noise`, and its Jacobian `J` at the solution, and the change `d = ∂r/∂δ` of
+    /// the residuals with what is left out, a small `δ` changes the unknowns by
     ///
     /// ```text
     /// ∂θ/∂δ = -(JᵀJ)⁻¹ Jᵀ d

@@ -3,7 +3,7 @@
 use loopsight_core::Place;
 use loopsight_model::run::Run;
 
-use crate::candidates::Candidate;
+use crate::candidates::{Candidate, largest_inputs};
 use crate::positions::Positions;
 
 /// Why, at these `values`, an effect cannot be what it says; none where it can.
@@ -13,16 +13,23 @@ use crate::positions::Positions;
 /// a force of the machine's own, which is as large as its position makes it; so nothing is said of what depends on a position,
 /// as gravity does. It says nothing either of a machine that was never commanded: what was let go moves by itself.
 pub(crate) fn implausible(candidate: &Candidate, values: &[f64], runs: &[Run]) -> Option<String> {
-    if Positions::matter_to(candidate.meta) {
+    let is_size = |i: &usize| {
+        let parameter = &candidate.model.parameters[*i];
+        let declared = parameter.declaration;
+        parameter.free && declared.unit == "channel" && declared.default == Some(0.0)
+    };
+    let sizes: Vec<usize> = candidate.own().filter(is_size).collect();
+    if sizes.is_empty() || Positions::matter_to(candidate.meta) {
         return None;
     }
-    let commands = candidate.at.iter().map(|id| largest(candidate, id, runs));
-    let largest = commands.fold(f64::INFINITY, f64::min);
-    candidate.own().find_map(|i| {
+    let commands = largest_inputs(&candidate.model, runs);
+    let at = candidate.at.iter();
+    let largest = at
+        .map(|id| largest(candidate, id, &commands))
+        .fold(f64::INFINITY, f64::min);
+    sizes.into_iter().find_map(|i| {
         let parameter = &candidate.model.parameters[i];
-        let declared = parameter.declaration;
-        let size = declared.unit == "channel" && declared.default == Some(0.0);
-        let value = values.get(i).filter(|_| size && parameter.free)?.abs();
+        let value = values.get(i)?.abs();
         (largest > 0.0 && value > largest).then(|| {
             let (name, unit) = (&parameter.name, &parameter.unit);
             format!("{name}: {value:.3} {unit} is beyond the largest command, {largest:.3} {unit}")
@@ -30,27 +37,20 @@ pub(crate) fn implausible(candidate: &Candidate, values: &[f64], runs: &[Run]) -
     })
 }
 
-/// The largest command of the input that a channel is of, or of those in its unit where it is an effort; no number is larger
-/// than that of a channel without any.
-fn largest(candidate: &Candidate, id: &str, runs: &[Run]) -> f64 {
+/// The largest of the `commands` of the input that a channel is of, or of those in its unit where it is an effort; no number is
+/// larger than that of a channel without any.
+fn largest(candidate: &Candidate, id: &str, commands: &[f64]) -> f64 {
     let plant = candidate.model.plant;
     let Some(channel) = plant.channels.iter().find(|c| c.id == id) else {
         return f64::INFINITY;
     };
-    let acts = |i: usize| match channel.place {
-        Place::Input(of) => of == i,
-        Place::Effort(_) => plant.inputs[i].unit == channel.unit,
+    let acts = |i: &usize| match channel.place {
+        Place::Input(of) => of == *i,
+        Place::Effort(_) => plant.inputs[*i].unit == channel.unit,
         _ => false,
     };
-    let inputs = (0..plant.inputs.len()).filter(|i| acts(*i));
-    let commands = inputs.flat_map(|i| {
-        let samples = runs
-            .iter()
-            .flat_map(move |run| (0..run.len()).map(move |k| run.input(k)));
-        samples.filter_map(move |u| u.get(i).map(|u| u.abs()))
-    });
-    let commands = commands.filter(|u| u.is_finite());
-    commands.reduce(f64::max).unwrap_or(f64::INFINITY)
+    let of_channel = (0..commands.len()).filter(acts).map(|i| commands[i]);
+    of_channel.reduce(f64::max).unwrap_or(f64::INFINITY)
 }
 
 #[cfg(test)]

@@ -40,6 +40,13 @@ struct Looked {
     least: f64,
 }
 
+impl Looked {
+    const NOTHING: Self = Self {
+        found: Vec::new(),
+        least: f64::INFINITY,
+    };
+}
+
 /// What a search found.
 #[derive(Default)]
 pub(crate) struct Found {
@@ -65,22 +72,20 @@ impl Search<'_> {
             return found;
         }
         let afresh = self.ended(self.looked_at_from_given());
-        let mut finalists = found.finalists;
-        let mut looked = found.looked;
+        let Found {
+            mut finalists,
+            mut looked,
+        } = found;
         looked.extend(afresh.looked);
         for again in afresh.finalists {
-            let same =
-                |other: &&(Judged, Explanation)| other.0.candidate.is_again(&again.0.candidate);
-            if finalists
-                .iter()
-                .find(same)
-                .is_none_or(|other| again.0.error() < other.0.error())
-            {
-                finalists.retain(|other| !same(&other));
-                finalists.push(again);
+            let mut same = finalists.iter_mut();
+            match same.find(|other| other.0.candidate.is_again(&again.0.candidate)) {
+                Some(other) if again.0.error() < other.0.error() => *other = again,
+                Some(_) => {}
+                None => finalists.push(again),
             }
         }
-        finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
+        in_order(&mut finalists);
         Found { finalists, looked }
     }
 
@@ -126,12 +131,12 @@ impl Search<'_> {
                 found
             })
             .collect();
-        finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
+        in_order(&mut finalists);
         for found in self.shrunk(&finalists) {
             finalists.retain(|(other, _)| !other.candidate.is_again(&found.0.candidate));
             finalists.push(found);
         }
-        finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
+        in_order(&mut finalists);
         let looked = if self.work.is_cancelled() {
             contest
         } else {
@@ -213,10 +218,7 @@ impl Search<'_> {
         let (first, mut waiting): (Vec<Attempt>, Vec<Attempt>) =
             promising.iter().cloned().partition(|(i, _)| simple(*i));
         let mut tried: BTreeSet<usize> = first.iter().map(|(i, _)| *i).collect();
-        let mut looked = Looked {
-            found: Vec::new(),
-            least: f64::INFINITY,
-        };
+        let mut looked = Looked::NOTHING;
         let (most, others) = first.split_at(first.len().min(MOST_PROMISING));
         self.look_at(most, others.len() + waiting.len(), &mut looked);
         self.look_at(others, waiting.len(), &mut looked);
@@ -245,10 +247,7 @@ impl Search<'_> {
                 Some((i, starts.into_iter().next()?))
             })
             .collect();
-        let mut looked = Looked {
-            found: Vec::new(),
-            least: f64::INFINITY,
-        };
+        let mut looked = Looked::NOTHING;
         self.look_at(&attempts, 0, &mut looked);
         looked.found
     }
@@ -407,6 +406,11 @@ fn does_something(explanation: &Explanation, least: f64, shift: f64) -> bool {
 /// The least error among some candidates.
 fn least<'j>(found: impl Iterator<Item = &'j Judged>) -> f64 {
     found.map(Judged::error).fold(f64::INFINITY, f64::min)
+}
+
+/// Puts finalists in order, the best first.
+fn in_order(finalists: &mut [(Judged, Explanation)]) {
+    finalists.sort_by(|a, b| a.0.error().total_cmp(&b.0.error()));
 }
 
 /// The candidates that were looked at, each from its best start, the best first.

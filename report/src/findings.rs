@@ -61,6 +61,7 @@ fn explanation(place: EffectAt, nrmse: f64, name: &str) -> Explanation {
         significance: 41.0,
         indistinguishable_from: vec![],
         note: "the residual jumps".into(),
+        implausible: None,
         model: model(1),
         nrmse_fit: 0.02,
     }

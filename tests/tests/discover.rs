@@ -123,22 +123,26 @@ fn is_found(found: &Improvement, law: &str, truth: &[(&str, f64)]) {
     }
 }
 
-const AXIS: &str = "[plant.dc_axis]\n[log.measured]\nspeed = { column = \"speed\" }\n";
+/// A motor that turns a load, whose model lacks nothing.
+const AXIS: Machine = Machine {
+    period: PERIOD,
+    inputs: &["voltage"],
+    commands: [0.0, 9.0],
+    states: 1,
+    at_rest: 0.0,
+    measured: &[0],
+    noise: 0.02,
+    rates: |_, u, x| vec![6.0 * u[0] - 2.0 * x[0]],
+    model: "[plant.dc_axis]\n[log.measured]\nspeed = { column = \"speed\" }\n",
+};
 
 /// An amplifier that is stronger to one side: `u + 0.03 u²`.
 #[test]
 #[ignore = "seconds: `.ci/run` runs it in release"]
 fn the_curve_of_an_amplifier_is_found() {
     let machine = Machine {
-        period: PERIOD,
-        inputs: &["voltage"],
-        commands: [0.0, 9.0],
-        states: 1,
-        at_rest: 0.0,
-        measured: &[0],
-        noise: 0.02,
         rates: |_, u, x| vec![6.0 * (u[0] + 0.03 * u[0] * u[0]) - 2.0 * x[0]],
-        model: AXIS,
+        ..AXIS
     };
     let truth = [("discovered.c", 0.03), ("K_C", 6.0), ("K_A", -2.0)];
     is_found(&discover(&machine), "c * drive^2", &truth);
@@ -149,15 +153,8 @@ fn the_curve_of_an_amplifier_is_found() {
 #[ignore = "seconds: `.ci/run` runs it in release"]
 fn a_load_that_grows_with_time_is_found() {
     let machine = Machine {
-        period: PERIOD,
-        inputs: &["voltage"],
-        commands: [0.0, 9.0],
-        states: 1,
-        at_rest: 0.0,
-        measured: &[0],
-        noise: 0.02,
         rates: |t, u, x| vec![6.0 * (u[0] - 0.02 * t) - 2.0 * x[0]],
-        model: AXIS,
+        ..AXIS
     };
     let truth = [("discovered.c", -0.02), ("K_C", 6.0), ("K_A", -2.0)];
     is_found(&discover(&machine), "c * time", &truth);
@@ -168,11 +165,8 @@ fn a_load_that_grows_with_time_is_found() {
 #[ignore = "seconds: `.ci/run` runs it in release"]
 fn a_spring_on_one_side_is_found() {
     let machine = Machine {
-        period: PERIOD,
-        inputs: &["voltage"],
         commands: [0.0, 3.0],
         states: 2,
-        at_rest: 0.0,
         measured: &[1],
         noise: 1e-3,
         rates: |_, u, x| {
@@ -180,6 +174,7 @@ fn a_spring_on_one_side_is_found() {
             vec![6.0 * (u[0] - spring) - 2.0 * x[0] - 40.0 * x[1].sin(), x[0]]
         },
         model: "[plant.arm]\nlevel_angle = 1.5707963267948966\n[log.measured]\nangle = { column = \"angle\" }\n",
+        ..AXIS
     };
     let truth = [("discovered.c", -5.0), ("K_G", 40.0), ("K_C", 6.0)];
     is_found(
@@ -201,7 +196,6 @@ fn heat_that_is_radiated_is_found() {
         states: 2,
         at_rest: 293.15,
         measured: &[0, 1],
-        noise: 0.02,
         rates: |_, u, x| {
             let radiated = 2e-9 * (x[1].powi(4) - 293.15f64.powi(4));
             let between = 2.0 * (x[0] - x[1]);
@@ -211,6 +205,7 @@ fn heat_that_is_radiated_is_found() {
             ]
         },
         model: "[plant.thermal]\n[log.measured]\nheater = { column = \"heater\" }\nbody = { column = \"body\" }\n",
+        ..AXIS
     };
     let truth = [("discovered.c", -1e-11), ("loss", 1e-3), ("heating", 0.02)];
     is_found(&discover(&machine), "c * (body^4 - s^4)", &truth);
@@ -222,15 +217,8 @@ fn heat_that_is_radiated_is_found() {
 #[ignore = "seconds: `.ci/run` runs it in release"]
 fn a_resistance_that_grows_with_time_is_known() {
     let machine = Machine {
-        period: PERIOD,
-        inputs: &["voltage"],
-        commands: [0.0, 9.0],
-        states: 1,
-        at_rest: 0.0,
-        measured: &[0],
-        noise: 0.02,
         rates: |t, u, x| vec![(1.0 - 0.005 * t) * (6.0 * u[0] - 1.5 * x[0]) - 0.5 * x[0]],
-        model: AXIS,
+        ..AXIS
     };
     let found = discover(&machine);
     let added = found.steps.iter().filter_map(|s| s.added.as_ref());
@@ -253,18 +241,12 @@ fn a_resistance_that_grows_with_time_is_known() {
 #[test]
 fn friction_behind_a_driver_that_coasts_is_found_with_it() {
     let machine = Machine {
-        period: PERIOD,
-        inputs: &["voltage"],
         commands: [3.2, 1.6],
-        states: 1,
-        at_rest: 0.0,
-        measured: &[0],
-        noise: 0.02,
         rates: |_, u, x| {
             let friction = 1.4 * (x[0] / 0.05).tanh();
             vec![30.0 * (u[0] - friction) - 10.0 * x[0] * u[0] / 5.0]
         },
-        model: AXIS,
+        ..AXIS
     };
     let model = Model::from_toml("machine", machine.model).unwrap().0;
     let log = record(&machine, 3000, 1);
@@ -289,11 +271,8 @@ fn friction_behind_a_driver_that_coasts_is_found_with_it() {
 #[test]
 fn a_force_that_depends_on_two_positions_is_found() {
     let machine = Machine {
-        period: PERIOD,
         inputs: &["f1", "f2"],
-        commands: [0.0, 9.0],
         states: 4,
-        at_rest: 0.0,
         measured: &[1, 3],
         noise: 5e-4,
         rates: |_, u, x| {
@@ -325,6 +304,7 @@ k2 = { value = 25.0, unit = "N/m", range = [0.0, 500.0] }
 x1 = { column = "x1" }
 x2 = { column = "x2" }
 "#,
+        ..AXIS
     };
     let truth = [("discovered.c", -15.0), ("k1", 20.0), ("d2", 1.5)];
     is_found(&discover(&machine), "c * position * x2", &truth);
