@@ -39,6 +39,8 @@ pub enum FaultKind {
     EmptyRun,
     /// A run that is not of the same machine in the same state as the others.
     BrokenRun,
+    /// A run that rests before it moves; the rest was left out.
+    RestingStart,
     /// Voltages logged as magnitudes; their signs were reconstructed.
     UnsignedVoltage,
     /// A column that does not say its unit; SI was assumed.
@@ -68,6 +70,7 @@ impl FaultKind {
             FaultKind::ShortRun => "short_run",
             FaultKind::EmptyRun => "empty_run",
             FaultKind::BrokenRun => "broken_run",
+            FaultKind::RestingStart => "resting_start",
             FaultKind::UnsignedVoltage => "unsigned_voltage",
             FaultKind::UnitAssumed => "unit_assumed",
             FaultKind::CutLog => "cut_log",
@@ -119,6 +122,7 @@ impl Fault {
         match self.kind {
             FaultKind::DuplicateTime
             | FaultKind::IrregularTime
+            | FaultKind::RestingStart
             | FaultKind::UnsignedVoltage
             | FaultKind::UnitAssumed => Severity::Note,
             FaultKind::BrokenRun => Severity::Fatal,

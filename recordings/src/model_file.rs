@@ -16,6 +16,10 @@ const PLAUSIBLE_HALF_TRACK: std::ops::RangeInclusive<f64> = 0.1..=1.0;
 /// Wheel radii, m, outside of which something is wrong with the units: from a toy to a tractor.
 const PLAUSIBLE_RADIUS: std::ops::RangeInclusive<f64> = 0.01..=1.0;
 
+/// Travel of an arm, rad, below which its weight counts as the same: on either side of the middle its sine changes by an eighth of
+/// its amplitude at most, where friction takes as much.
+const SAME_WEIGHT: f64 = 0.25;
+
 /// SysId logs a motor's voltage as its controller puts it out: the duty times the battery's voltage of the time.
 const MEASURED_INPUTS: &str = "# They are voltages at the motor: a supply that sags and a driver's limits are in them.\n\
      [log]\n\
@@ -156,26 +160,38 @@ impl SysIdLog {
     }
 
     fn axis(&self, text: &mut String) {
-        text.push_str("[plant.dc_axis]\n\n# The input is the column voltage_V.\n");
-        text.push_str(MEASURED_INPUTS);
+        let turns = self.test == TestKind::Arm && self.travel() * self.turn() > SAME_WEIGHT;
+        text.push_str("[plant.dc_axis]\n\n");
         match self.test {
-            TestKind::Arm => line(
-                text,
-                "# An arm is lifted: the effect gravity_pendulum says so.",
+            TestKind::Arm if turns => text.push_str(
+                "# The weight of the arm: a sine of its angle.\n\
+                 [[effect]]\n[effect.gravity_pendulum]\nat = [\"shaft\"]\n\n",
             ),
-            TestKind::Elevator => {
-                line(
-                    text,
-                    "# A lift has weight: the effect constant_force says so.",
-                );
-                line(
-                    text,
-                    "# The speed is that of the shaft; its unit of length does not matter.",
-                );
-            }
+            TestKind::Arm => text.push_str(
+                "# The weight of the arm, which hardly turns here: gravity_pendulum is that of one that does.\n\
+                 [[effect]]\n[effect.constant_force]\nat = [\"shaft\"]\n\n",
+            ),
+            TestKind::Elevator => text.push_str(
+                "# The weight of the lift.\n\
+                 [[effect]]\n[effect.constant_force]\nat = [\"shaft\"]\n\n",
+            ),
             _ => {}
         }
+        text.push_str(
+            "# The voltage at the motor: a supply that sags and a driver's limits are in it.\n\
+             [log]\ninputs_measured = true\n\n[log.inputs.voltage]\ncolumn = \"voltage_V\"\n\n",
+        );
+        if self.test == TestKind::Elevator {
+            line(
+                text,
+                "# The speed is that of the shaft; its unit of length does not matter.",
+            );
+        }
         line(text, "[log.measured.speed]");
+        if turns {
+            line(text, "# The weight depends on the angle.");
+            line(text, "[log.measured.angle]");
+        }
     }
 }
 
@@ -226,7 +242,17 @@ mod tests {
 
     #[test]
     fn an_axis() {
-        let text = model("Elevator", "Meters", "[0,0,0,0]");
+        let text = model("Simple", "Meters", "[0,0,0,0]");
         assert!(text.contains("[plant.dc_axis]\n") && text.ends_with("[log.measured.speed]\n"));
+        assert!(!text.contains("effect"), "{text}");
+        let text = model("Elevator", "Meters", "[0,0,0,0]");
+        assert!(text.contains("[effect.constant_force]\nat = [\"shaft\"]\n"));
+        let text = model("Arm", "Rotations", "[0,0,0,0],[0.1,0,0.01,0]");
+        assert!(text.contains("[effect.constant_force]\n"), "{text}");
+        let text = model("Arm", "Rotations", "[0,0,0,0],[0.1,0,0.1,0]");
+        assert!(
+            text.contains("[effect.gravity_pendulum]\n")
+                && text.ends_with("[log.measured.angle]\n")
+        );
     }
 }

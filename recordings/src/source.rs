@@ -48,7 +48,12 @@ impl Source {
                 let (table, map) = channels::prepare(log, inputs, signals, map)?;
                 (Cow::Owned(table), Cow::Owned(map))
             }
-            _ => (self.table(), Cow::Borrowed(map)),
+            Source::SysId(log) => {
+                let moving = log.without_rest();
+                let table = moving.as_ref().unwrap_or(log).table();
+                (Cow::Owned(table), Cow::Borrowed(map))
+            }
+            Source::Table(table) => (Cow::Borrowed(table), Cow::Borrowed(map)),
         };
         if map.period_s.is_some() && self.says_both(&map) {
             return Err(RecordingError::TimeTwice);

@@ -20,6 +20,7 @@ use crate::error::RecordingError;
 use crate::names::nearest;
 
 mod broken;
+mod resting;
 mod view;
 
 /// The mechanism that was tested.

@@ -141,16 +141,48 @@ fn friction(fit: &Fit, runs: &[Run]) -> Option<InMotion> {
     in_motion(fit, &effects, ("kV", radius), runs, &Work::quiet()).ok()?
 }
 
-/// What gravity takes of the voltages.
+/// What gravity takes of the voltages: against a constant force its opposite, and the amplitude of the sine of an arm, where
+/// the zero of its angle does not matter.
 fn gravity(fit: &Fit) -> Option<ParameterEstimate> {
-    let named = |name: &str| {
-        let effect = name.split(['.', '@']).next();
-        effect.is_some_and(|e| ["constant_force", "gravity_pendulum"].contains(&e))
-            && name.ends_with(".level")
+    let of = |effect: &Attached, id: &str| {
+        let own = effect.meta.parameters.iter().position(|p| p.id == id)?;
+        let parameter = fit.model.parameters.get(effect.first_parameter + own)?;
+        let estimate = fit.parameters.get(&parameter.name)?;
+        (estimate.unit == "V").then(|| ParameterEstimate::from(estimate))
     };
-    let found = fit.parameters.iter();
-    let found = found.filter(|(name, p)| named(name) && p.unit == "V");
-    mean(found.map(|(_, p)| ParameterEstimate::from(p)).collect())
+    let weights = fit
+        .model
+        .effects
+        .iter()
+        .filter_map(|effect| match effect.meta.id {
+            "constant_force" => of(effect, "force").map(opposite),
+            "gravity_pendulum" => Some(amplitude(of(effect, "cosine")?, of(effect, "sine")?)),
+            _ => None,
+        });
+    mean(weights.collect())
+}
+
+fn opposite(mut of: ParameterEstimate) -> ParameterEstimate {
+    of.value = -of.value;
+    of.interval95 = of.interval95.map(|[low, high]| [-high, -low]);
+    of
+}
+
+/// `√(a² + b²)`, its error by linearisation, as if those of `a` and `b` had nothing to do with each other.
+fn amplitude(a: ParameterEstimate, b: ParameterEstimate) -> ParameterEstimate {
+    let mut amplitude = a.clone();
+    let size = a.value.hypot(b.value);
+    let along = |a_error: f64, b_error: f64| {
+        (a.value * a_error).hypot(b.value * b_error) / size.max(f64::MIN_POSITIVE)
+    };
+    let half = |ends: [f64; 2]| 0.5 * (ends[1] - ends[0]);
+    amplitude.value = size;
+    amplitude.std_error = (a.std_error.zip(b.std_error)).map(|(a, b)| along(a, b));
+    amplitude.interval95 = a.interval95.zip(b.interval95).map(|(a, b)| {
+        let half = along(half(a), half(b));
+        [size - half, size + half]
+    });
+    amplitude
 }
 
 /// The mean of what each channel has of its own; its error that of channels that err together. None of nothing.

@@ -133,6 +133,8 @@ mirror! {
         EmptyRun,
         /// A run that is not of the same machine in the same state as the others.
         BrokenRun,
+        /// A run that rests before it moves; the rest was left out.
+        RestingStart,
         /// Voltages logged as magnitudes; their signs were reconstructed.
         UnsignedVoltage,
         /// A column that does not say its unit; SI was assumed.

@@ -14,6 +14,9 @@ const CLEAR: f64 = 0.2;
 const ENOUGH: usize = 50;
 /// and this share of them must disagree. Inertia alone makes half of them disagree at worst.
 const DISAGREE: f64 = 0.9;
+/// Correlation of a velocity with the change of a position over two samples from which it is that position's: the counts of a
+/// coarse encoder leave about so much of it.
+const AGREES: f64 = 0.3;
 
 pub(crate) fn check(recording: &Recording, inputs: &[&str]) -> Vec<Fault> {
     let mut found = Vec::new();
@@ -40,7 +43,8 @@ pub(crate) fn check(recording: &Recording, inputs: &[&str]) -> Vec<Fault> {
             .collect::<Vec<_>>();
         if let Some(share) = disagreement(&drives, &values) {
             let what = drive.describe(inputs);
-            found.push(reversed(&measured.id, &what, share));
+            let with = position_of(recording, *s, values.iter().copied());
+            found.push(reversed(&measured.id, &what, share, with));
         }
     }
     // One input for both sides: the sides tell on each other.
@@ -61,21 +65,66 @@ pub(crate) fn check(recording: &Recording, inputs: &[&str]) -> Vec<Fault> {
                     .collect::<Vec<_>>()
             };
             if let Some(share) = disagreement(&values(*r), &values(*s)) {
-                found.push(reversed(&left.id, &format!("`{}`", right.id), share));
+                let what = format!("`{}`", right.id);
+                found.push(reversed(&left.id, &what, share, None));
             }
         }
     }
     found
 }
 
-fn reversed(id: &str, against: &str, (share, count): (f64, usize)) -> Fault {
+/// The position that a velocity is the change of, where that is measured, too.
+fn position_of(
+    recording: &Recording,
+    velocity: usize,
+    values: impl Iterator<Item = f64> + Clone,
+) -> Option<&str> {
+    let of = parse(&recording.measured.get(velocity)?.unit)
+        .ok()?
+        .dimension;
+    let is_position = |m: &MappedSignal| {
+        parse(&m.unit).is_ok_and(|unit| {
+            let d = unit.dimension;
+            (d.metre, d.radian, d.second) == (of.metre, of.radian, 0)
+        })
+    };
+    let mut positions = (recording.measured.iter().enumerate()).filter(|(_, m)| is_position(m));
+    let (p, position) = positions.next()?;
+    if positions.next().is_some() {
+        return None;
+    }
+    // The change over a sample before and a sample behind.
+    let changes = recording.runs.iter().flat_map(|run| {
+        let x: Vec<f64> = signal(run, p).collect();
+        let change = move |k: usize| x.get(k + 1).unwrap_or(&x[k]) - x[k.saturating_sub(1)];
+        (0..run.len()).map(change).collect::<Vec<_>>()
+    });
+    let pairs = changes.zip(values);
+    let (mut cross, mut of_change, mut of_value) = (0.0, 0.0, 0.0);
+    for (change, value) in pairs.filter(|(c, v)| (c * v).is_finite()) {
+        cross += change * value;
+        of_change += change * change;
+        of_value += value * value;
+    }
+    (cross > AGREES * (of_change * of_value).sqrt()).then_some(position.id.as_str())
+}
+
+fn reversed(id: &str, against: &str, (share, count): (f64, usize), with: Option<&str>) -> Fault {
+    let mend = match with {
+        Some(with) => format!(
+            "as does `{with}`, so it is {against} that has the wrong sign (`scale = -1` in the model's [log.inputs] turns it)"
+        ),
+        None => {
+            "one of them has the wrong sign (`scale = -1` in the model's [log] turns it)".to_owned()
+        }
+    };
     Fault {
         kind: FaultKind::ReversedSign,
         run: String::new(),
         signal: id.into(),
         detail: format!(
             "runs against {against} in {:.1} % of the {count} samples where both are clearly not \
-             zero: one of them has the wrong sign (`scale = -1` in the model's [log] turns it)",
+             zero: {mend}",
             100.0 * share
         ),
     }

@@ -105,7 +105,7 @@ impl SysIdLog {
     }
 
     /// What a rotation is in the table: m for a drivetrain in units of length, rad for all else.
-    fn turn(&self) -> f64 {
+    pub(crate) fn turn(&self) -> f64 {
         // The shaft of a lift turns, too: its length per rotation does not matter here.
         match self.metres_per_rotation() {
             Some(metres) if self.test.is_drivetrain() => metres,
@@ -168,6 +168,7 @@ impl SysIdLog {
         }
         notes.extend(self.implausible());
         notes.extend(self.broken_runs());
+        notes.extend(self.rest());
         notes
     }
 
