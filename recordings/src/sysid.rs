@@ -22,6 +22,7 @@ use crate::names::nearest;
 mod broken;
 mod resting;
 mod view;
+mod windows;
 
 /// The mechanism that was tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,16 +1,11 @@
 //! Runs of a SysId log that do not belong to the same machine in the same state as the others: stalled,
 //! blocked at the start, recorded in other units, under a voltage that breaks down.
 //!
-//! The runs are compared with each other by the regression that SysId itself makes,
-//!
-//! ```text
-//! u = kS sign(y) + kV y + kA y'
-//! ```
-//!
-//! over windows, so that noise and lateness matter little.
+//! The runs are compared with each other by the regression that SysId itself makes, over [`windows`].
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
+use super::windows::{ENOUGH, Window, feedforward, highest, left, moving, windows};
 use super::{SysIdLog, TestKind};
 use crate::fault::{Fault, FaultKind};
 use crate::faults::large;
@@ -21,9 +16,7 @@ const WINDOW: f64 = 0.2;
 /// Length of a window for what the supply does, s: long against a single reading that is wrong, short against
 /// a controller that switches off and on again.
 const SUPPLY_WINDOW: f64 = 0.1;
-/// Share of the large speed above which a machine clearly moves,
-const MOVES: f64 = 0.1;
-/// and below which it rests.
+/// Share of the large speed below which a machine rests.
 const RESTS: f64 = 0.02;
 /// Gain of a run over that of the others, either way, from which it is another one. Sides, directions and
 /// a battery that sags differ by a quarter at most.
@@ -49,30 +42,15 @@ const BLOCKED: f64 = 2.0;
 const BREAKDOWN: f64 = 0.3;
 /// and how many times until a run counts as one under a broken voltage. The procedures of SysId have one step.
 const BREAKDOWNS: usize = 4;
-/// Fewest windows in motion that say anything.
-const ENOUGH: usize = 10;
-
-/// Means over a window.
-#[derive(Clone, Copy, Debug)]
-struct Window {
-    start: f64,
-    end: f64,
-    voltage: f64,
-    speed: f64,
-    acceleration: f64,
-}
-
+/// Share of the voltage that what the other runs agree on may leave of a run. Good logs leave an eighth at most.
+const UNLIKE: f64 = 0.3;
+/// Ratio of the largest to the least voltage in motion from which runs tell friction and gain apart.
+const VOLTAGES: f64 = 2.0;
 /// One motor in one run.
 struct Trace<'a> {
     run: &'a str,
     voltages: Vec<f64>,
     windows: Vec<Window>,
-}
-
-/// `[kS, kV, kA]`, and the share of the voltage that they leave.
-struct Feedforward {
-    terms: Vector3<f64>,
-    left: f64,
 }
 
 impl SysIdLog {
@@ -131,7 +109,8 @@ fn of_motor(table: &Table, voltage: usize, speed: usize, signal: &str) -> Vec<Fa
     for index in (0..traces.len()).filter(|index| !known.contains(index)) {
         let others = || besides(&traces, index, &known);
         seen[index] = held_up(&traces[index], others(), large)
-            .or_else(|| blocked(&traces[index], others(), large));
+            .or_else(|| blocked(&traces[index], others(), large))
+            .or_else(|| unlike(&traces[index], others(), large));
     }
     let fault = |(trace, detail): (&Trace<'_>, Option<String>)| {
         Some(Fault {
@@ -155,68 +134,31 @@ fn besides<'t>(
         .map(|(_, trace)| trace)
 }
 
-/// The largest voltage, either way.
-fn highest<'w>(windows: impl IntoIterator<Item = &'w Window>) -> f64 {
-    let volts = windows.into_iter().map(|w| w.voltage.abs());
-    volts.fold(0.0, f64::max)
-}
-
-/// Windows of a run, each half over the one before.
-fn windows<'t>(
-    rows: impl Iterator<Item = &'t [f64]>,
-    length: f64,
-    voltage: usize,
-    speed: usize,
-) -> Vec<Window> {
-    let rows: Vec<[f64; 3]> = rows
-        .filter_map(|row| Some([*row.first()?, *row.get(voltage)?, *row.get(speed)?]))
-        .filter(|row| row.iter().all(|v| v.is_finite()))
-        .collect();
-    let mut windows = Vec::new();
-    let mut first = 0;
-    while let Some(start) = rows.get(first) {
-        let later = |t: f64| rows.partition_point(|row| row[0] < t);
-        let last = later(start[0] + length);
-        let (Some(end), Some(within)) = (rows.get(last), rows.get(first..last)) else {
-            break;
-        };
-        let n = within.len().max(1) as f64;
-        let mean = |column: usize| within.iter().map(|row| row[column]).sum::<f64>() / n;
-        let span = end[0] - start[0];
-        // A gap is no window.
-        if span > 0.0 && span < 2.0 * length {
-            windows.push(Window {
-                start: start[0],
-                end: end[0],
-                voltage: mean(1),
-                speed: mean(2),
-                acceleration: (end[2] - start[2]) / span,
-            });
-        }
-        first = later(start[0] + 0.5 * length).max(first + 1);
-    }
-    windows
-}
-
-/// The regression over the windows in motion; none where they are too few.
-fn feedforward<'w>(windows: impl Iterator<Item = &'w Window>, large: f64) -> Option<Feedforward> {
-    let moving: Vec<&Window> = windows.filter(|w| w.speed.abs() > MOVES * large).collect();
-    let phi = |w: &Window| Vector3::new(w.speed.signum(), w.speed, w.acceleration);
-    let (mut gram, mut right, mut square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
-    for window in &moving {
-        let phi = phi(window);
-        gram += phi * phi.transpose();
-        right += phi * window.voltage;
-        square += window.voltage * window.voltage;
-    }
-    let terms = gram.try_inverse()? * right;
-    let left: f64 = moving
-        .iter()
-        .map(|w| (w.voltage - terms.dot(&phi(w))).powi(2))
-        .sum();
-    (moving.len() >= ENOUGH && square > 0.0).then(|| Feedforward {
-        terms,
-        left: (left / square).sqrt(),
+/// Moves in another way than what the other runs agree on, all along.
+fn unlike<'t>(
+    trace: &'t Trace<'_>,
+    others: impl Iterator<Item = &'t Trace<'t>> + Clone,
+    large: f64,
+) -> Option<String> {
+    let others = || others.clone().flat_map(|t| &t.windows);
+    let volts = moving(others(), large).into_iter().map(|w| w.voltage.abs());
+    let (least, most) = volts.fold((f64::INFINITY, 0.0f64), |(least, most), u| {
+        (least.min(u), most.max(u))
+    });
+    let without = feedforward(others(), large)?;
+    let hardest = hardest(others());
+    let mut own = moving(trace.windows.iter(), large);
+    own.retain(|w| w.acceleration.abs() <= hardest);
+    let here = left(&without.terms, &own)?;
+    let told = most > VOLTAGES * least && own.len() >= ENOUGH;
+    let stands_out = without.left < AGREES && here > UNLIKE.max(BETTER * without.left);
+    (told && stands_out).then(|| {
+        format!(
+            "what the other runs agree on leaves {:.0} % of their voltage and {:.0} % of this one's: it is not the voltage that \
+             moves it here, as when wheels hop",
+            100.0 * without.left,
+            100.0 * here
+        )
     })
 }
 
@@ -227,9 +169,7 @@ fn other_gain<'t>(
     large: f64,
 ) -> Option<String> {
     let others: Vec<&Window> = others.flat_map(|t| &t.windows).collect();
-    let own: Vec<&Window> = (trace.windows.iter())
-        .filter(|w| w.speed.abs() > MOVES * large)
-        .collect();
+    let own = moving(trace.windows.iter(), large);
     let without = feedforward(others.iter().copied(), large)?;
     let with = feedforward(others.iter().copied().chain(&trace.windows), large)?;
     if own.len() < ENOUGH || without.left > AGREES || with.left < BETTER * without.left {
@@ -271,19 +211,24 @@ fn other_gain<'t>(
 /// Driven by more than twice the voltage that the other runs need at its speed and acceleration.
 fn held_up<'t>(
     trace: &'t Trace<'_>,
-    others: impl Iterator<Item = &'t Trace<'t>>,
+    others: impl Iterator<Item = &'t Trace<'t>> + Clone,
     large: f64,
 ) -> Option<String> {
-    let without = feedforward(others.flat_map(|t| &t.windows), large)?;
+    let others = || others.clone().flat_map(|t| &t.windows);
+    let without = feedforward(others(), large)?;
+    let hardest = hardest(others());
     let needed = |w: &Window| {
         let direction = if w.speed == 0.0 { w.voltage } else { w.speed };
-        let phi = Vector3::new(direction.signum(), w.speed, w.acceleration);
-        without.terms.dot(&phi)
+        without
+            .terms
+            .dot(&Vector3::new(direction.signum(), w.speed, w.acceleration))
     };
     let highest = highest(&trace.windows);
     let far = |w: &Window| {
         let wasted = w.voltage.signum() * (w.voltage - needed(w));
-        wasted > HELD_UP * w.voltage.abs() && w.voltage.abs() > HELD_UP * highest
+        wasted > HELD_UP * w.voltage.abs()
+            && w.voltage.abs() > HELD_UP * highest
+            && w.acceleration.abs() <= hardest
     };
     let (from, length, at) = longest(&trace.windows, far)?;
     (without.left < AGREES).then(|| {
@@ -294,6 +239,11 @@ fn held_up<'t>(
             needed(at).abs()
         )
     })
+}
+
+/// The hardest acceleration. What a harder one takes is not known from these.
+fn hardest<'w>(windows: impl Iterator<Item = &'w Window>) -> f64 {
+    windows.map(|w| w.acceleration.abs()).fold(0.0, f64::max)
 }
 
 /// The longest stretch of windows that are `so`, longer than a stall must be: when it begins, counted from the
@@ -459,6 +409,20 @@ mod tests {
             log(|run, t, u, v| (if back(run) && t < 3.5 { 0.0 } else { u }, v)),
             "slow-backward",
             "its start was blocked",
+        );
+        named(
+            log(|run, t, u, v| {
+                (
+                    u,
+                    if fast(run) {
+                        v * (1.0 + 0.8 * (14.0 * t).sin())
+                    } else {
+                        v
+                    },
+                )
+            }),
+            "fast-forward",
+            "as when wheels hop",
         );
     }
 }
