@@ -33,6 +33,8 @@ pub enum FaultKind {
     ReversedSign,
     /// A rate that is not the derivative of its angle, by the factor between degrees and radians.
     GyroScale,
+    /// A rate that is not the derivative of its position, by another factor.
+    RateScale,
     /// A run too short to learn from.
     ShortRun,
     /// A run without rows.
@@ -67,6 +69,7 @@ impl FaultKind {
             FaultKind::Motionless => "motionless",
             FaultKind::ReversedSign => "reversed_sign",
             FaultKind::GyroScale => "gyro_scale",
+            FaultKind::RateScale => "rate_scale",
             FaultKind::ShortRun => "short_run",
             FaultKind::EmptyRun => "empty_run",
             FaultKind::BrokenRun => "broken_run",

@@ -127,6 +127,8 @@ mirror! {
         ReversedSign,
         /// A rate that is not the derivative of its angle, by the factor between degrees and radians.
         GyroScale,
+        /// A rate that is not the derivative of its position, by another factor.
+        RateScale,
         /// A run too short to learn from.
         ShortRun,
         /// A run without rows.

@@ -67,20 +67,26 @@ pub(crate) fn check(table: &Table, plan: &Plan) -> Vec<Fault> {
                 FaultKind::ReversedSign,
                 "of the wrong sign (`scale = -1` in the model's [log] turns it)",
             )
+        } else if !UNITY.contains(&ratio.abs()) {
+            (FaultKind::RateScale, "one of the two is in another unit")
         } else {
             continue;
         };
-        let sign = if kind == FaultKind::GyroScale && ratio < 0.0 {
+        let sign = if kind != FaultKind::ReversedSign && ratio < 0.0 {
             ", and its sign is wrong"
         } else {
             ""
+        };
+        let ratio = match (1e-2..1e3).contains(&ratio.abs()) {
+            true => format!("{ratio:.4}"),
+            false => format!("{ratio:.2e}"),
         };
         found.push(Fault {
             kind,
             run: String::new(),
             signal: rate.shown.clone(),
             detail: format!(
-                "its integral is {ratio:.4} times the change of `{}` (correlation \
+                "its integral is {ratio} times the change of `{}` (correlation \
                  {correlation:.3}): {what}{sign}",
                 angle.shown
             ),
@@ -203,6 +209,11 @@ mod tests {
             let found = gyro(factor, "gyro_rate_rad_per_s", "other");
             assert_eq!(found[0].kind, FaultKind::GyroScale, "{factor}");
             assert_eq!(found[0].signal, "gyro_rate_rad_per_s");
+            assert_eq!(found[0].severity(), Severity::Warning);
+        }
+        for factor in [9.55, 1e-4] {
+            let found = gyro(factor, "gyro_rate_rad_per_s", "other");
+            assert_eq!(found[0].kind, FaultKind::RateScale, "{factor}");
             assert_eq!(found[0].severity(), Severity::Warning);
         }
         // Said to be in degrees, and so it is.
