@@ -184,7 +184,7 @@ impl State {
             self.steps.push(ImprovementStep {
                 added: None,
                 entries: None,
-                round,
+                round: Some(round),
                 nrmse_fit: diagnosis.nominal_fit,
                 nrmse_test: diagnosis.nominal.nrmse,
                 still_open: Vec::new(),
@@ -199,7 +199,7 @@ impl State {
         self.steps.push(ImprovementStep {
             added: Some(best.place),
             entries: best.entries,
-            round,
+            round: Some(round),
             nrmse_fit: best.nrmse_fit,
             nrmse_test: best.nrmse,
             still_open: Vec::new(),
@@ -385,7 +385,7 @@ mod tests {
                 at: vec!["shaft".to_owned()],
             }),
             entries: None,
-            round: 0,
+            round: Some(0),
             nrmse_fit: 0.1,
             nrmse_test: 0.1,
             still_open: Vec::new(),

@@ -14,9 +14,10 @@ pub struct ImprovementStep {
     /// The `[[effect]]` entries of what was added, where the library has no such effect.
     #[serde(skip)]
     pub entries: Option<String>,
-    /// The round whose diagnosis named it: its place among [`Improvement::diagnoses`].
+    /// The round whose diagnosis named it: its place among [`Improvement::diagnoses`]; none where it came of the correction of
+    /// another step.
     #[serde(skip)]
-    pub round: usize,
+    pub round: Option<usize>,
     /// Free-run error on the fitting data.
     pub nrmse_fit: f64,
     /// Free-run error on the validation data.

@@ -125,6 +125,7 @@ mod search;
 mod settings;
 mod shows;
 mod solve;
+mod split;
 mod stamps;
 mod starts;
 mod stride;

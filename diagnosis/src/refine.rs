@@ -14,11 +14,12 @@ use crate::measurements::Measurements;
 use crate::output_error::fitted_values;
 use crate::progress::{Stage, Work};
 use crate::solve::Effort;
+use crate::split::split;
 
 /// Corrects `model` after the last of `steps`:
 ///
 /// * an effect that the last one made needless is removed, and its step with it;
-/// * a simpler effect replaces one that contains it, where the error hardly grows;
+/// * a simpler effect replaces one that contains it, where the error hardly grows; so do two with fewer parameters;
 /// * an effect that the data could not tell from an earlier one replaces it, where the error falls (the
 ///   `diagnoses` of the earlier steps name them); the same effect at fewer places only where nothing else is missing
 ///   then;
@@ -44,6 +45,7 @@ pub(crate) fn refine(
         return Ok(false);
     }
     simplified(&mut best, steps)?;
+    split(&mut best, steps)?;
     reconsidered(&mut best, steps, diagnoses)?;
     sharpened(&mut best)?;
     Ok(true)
@@ -153,12 +155,16 @@ fn without(model: &Model, effects: &[usize]) -> Option<Model> {
         .try_fold(model.clone(), |model, index| model.without_effect(*index))
 }
 
+/// Parameters that are fitted.
+pub(crate) fn free(model: &Model) -> usize {
+    model.parameters.iter().filter(|p| p.free).count()
+}
+
 /// Replaces an added effect by a simpler one that it contains, where the error hardly grows: what looked like
 /// breakaway friction may have been friction with a delay that was still missing. The step then names the
 /// simpler effect.
 fn simplified(best: &mut Refined<'_>, steps: &mut [ImprovementStep]) -> Result<(), FitError> {
     let criteria = &best.work.criteria().choice;
-    let free = |model: &Model| model.parameters.iter().filter(|p| p.free).count();
     for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
         let instances = instances(best.model, place);
         let Some(effect) = instances.first().map(|i| &best.model.effects[*i]) else {
@@ -259,7 +265,7 @@ pub(crate) fn still_open(
 
 /// What the data could not tell from the effect of a step when it was added.
 fn twins<'a>(step: &ImprovementStep, diagnoses: &'a [Diagnosis]) -> Vec<&'a EffectAt> {
-    let named = diagnoses.get(step.round).and_then(|d| d.candidates.first());
+    let named = (step.round).and_then(|round| diagnoses.get(round)?.candidates.first());
     let class = named
         .iter()
         .flat_map(|n| std::iter::once(&n.place).chain(&n.indistinguishable_from));
@@ -291,12 +297,12 @@ fn exchanged(model: &Model, place: &EffectAt, other: &EffectAt) -> Option<Model>
 }
 
 /// A model, and others that may take its place.
-struct Refined<'a> {
-    model: &'a mut Model,
+pub(crate) struct Refined<'a> {
+    pub(crate) model: &'a mut Model,
     /// Its error, once it was computed.
     error: Option<f64>,
-    measurements: &'a Measurements<'a>,
-    work: &'a Work<'a>,
+    pub(crate) measurements: &'a Measurements<'a>,
+    pub(crate) work: &'a Work<'a>,
     /// Changes that were tried.
     changes: u64,
 }
@@ -304,7 +310,7 @@ struct Refined<'a> {
 impl Refined<'_> {
     /// Takes the best of the fitted `candidates` whose error is below their `share` of the present one. Candidates
     /// that cannot be fitted, because their free run diverges, do not count.
-    fn takes<T: Send>(
+    pub(crate) fn takes<T: Send>(
         &mut self,
         candidates: Vec<(T, Model)>,
         share: impl Fn(&Model) -> f64 + Sync,
@@ -347,7 +353,7 @@ impl Refined<'_> {
 
 /// Indices of a step's effect in `model`: one, or one for each of its channels; none when another effect has
 /// replaced it.
-fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
+pub(crate) fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
     let of_place = |e: &Attached| {
         e.meta.id == place.effect && e.at.iter().all(|c| place.at.iter().any(|at| at == c.id))
     };
@@ -384,7 +390,7 @@ const CORRECTION: Effort = Effort {
 };
 
 /// The error of a model after a short fit, and the fitted model.
-fn refitted(
+pub(crate) fn refitted(
     model: &Model,
     measurements: &Measurements<'_>,
     work: &Work<'_>,

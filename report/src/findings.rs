@@ -154,7 +154,7 @@ pub(crate) fn fit() -> Fit {
 pub(crate) fn improvement(last: Conclusion) -> Improvement {
     let best = diagnosis(last).model.is_some().then(fit);
     let step = |added, nrmse_fit, nrmse_test| ImprovementStep {
-        round: 0,
+        round: Some(0),
         entries: None,
         still_open: Vec::new(),
         added,

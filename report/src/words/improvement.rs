@@ -253,7 +253,7 @@ mod tests {
         ImprovementStep {
             added: None,
             entries: None,
-            round: 0,
+            round: Some(0),
             nrmse_fit,
             nrmse_test,
             still_open: Vec::new(),

@@ -1,6 +1,7 @@
-//! Logs of arms and lifts in SysId's format, without a model file: friction, weight and gain are those of the machine.
+//! Logs of arms, lifts and flywheels in SysId's format, without a model file: friction, weight, drag and gain are those of the
+//! machine.
 //!
-//! The machine begins on its stop, as it does in a workshop, and is held there until the voltage lifts it.
+//! An arm and a lift begin on a stop, as they do in a workshop, and are held there until the voltage lifts them.
 
 #![allow(
     clippy::unwrap_used,
@@ -13,7 +14,7 @@ use std::fmt::Write;
 use loopsight::{Answer, ImproveOptions, Log, Session};
 use serde_json::Value;
 
-/// `u = kS sign(v) + weight(x) + kV v + kA v'`, V, m (or rad) and s, between stops `ends`.
+/// `u = kS sign(v) + weight(x) + kV v + drag v abs(v) + kA v'`, V, m (or rad) and s, between stops `ends`.
 struct Machine {
     test: &'static str,
     units: &'static str,
@@ -21,6 +22,7 @@ struct Machine {
     friction: f64,
     weight: fn(f64) -> f64,
     per_speed: f64,
+    drag: f64,
     per_acceleration: f64,
     ends: [f64; 2],
     step: f64,
@@ -52,7 +54,7 @@ impl Machine {
                 let t = PERIOD * f64::from(k / 10);
                 rows.push(format!("[{t},{u},{position},{}]", v / self.per_rotation));
             }
-            let driven = u - (self.weight)(x) - self.per_speed * v;
+            let driven = u - (self.weight)(x) - (self.per_speed + self.drag * v.abs()) * v;
             // Held by friction, or sliding against it.
             let friction = match v == 0.0 {
                 true => driven.clamp(-self.friction, self.friction),
@@ -106,6 +108,7 @@ fn a_lift_on_its_floor() {
         friction: 0.3,
         weight: |_| 0.9,
         per_speed: 6.0,
+        drag: 0.0,
         per_acceleration: 0.25,
         ends: [0.0, 1.2],
         step: 5.0,
@@ -125,6 +128,7 @@ fn an_arm_on_its_stop() {
         friction: 0.25,
         weight: |x| 0.8 * x.cos(),
         per_speed: 2.0,
+        drag: 0.0,
         per_acceleration: 0.15,
         ends: [-0.4, 1.2],
         step: 4.0,
@@ -133,4 +137,32 @@ fn an_arm_on_its_stop() {
     for (key, truth) in [("kS", 0.25), ("kG", 0.8), ("kV", 2.0), ("kA", 0.15)] {
         is_near(&answer, key, truth);
     }
+}
+
+/// Alone, friction that falls with the speed explains more of it than dry friction or drag.
+#[test]
+fn a_flywheel_with_drag() {
+    let answer = Machine {
+        test: "Simple",
+        units: "Rotations",
+        per_rotation: 1.0,
+        friction: 0.5,
+        weight: |_| 0.0,
+        per_speed: 0.12,
+        drag: 4e-4,
+        per_acceleration: 0.06,
+        ends: [0.0, 180.0],
+        step: 6.0,
+    }
+    .answer();
+    let steps = answer["steps"].as_array().unwrap().iter();
+    let added: Vec<&str> = steps
+        .filter_map(|s| s["added"]["effect"].as_str())
+        .collect();
+    assert_eq!(added, ["coulomb_friction", "quadratic_drag"]);
+    let level = &answer["parameters"]["coulomb_friction.level"]["value"];
+    assert!(
+        (level.as_f64().unwrap() / 0.5 - 1.0).abs() < 0.03,
+        "{level}"
+    );
 }
