@@ -89,9 +89,11 @@ pub(super) fn coupling(m: &mut Physics, mut of: Concealed) -> Concealed {
     m.body.mass -= inertia;
     m.twisting = Some(shaft);
     of.at = vec!["inertia"];
+    // With the motor held it swings with that frequency; against the motor's side faster.
+    let faster = f64::sqrt(1.0 + ratio);
     of.fitted("ratio", ratio, "1")
-        .fitted("antiresonance", frequency, "rad/s")
-        .fitted("damping", damping, "1")
+        .fitted("resonance", faster * frequency, "rad/s")
+        .fitted("damping", faster * damping, "1")
         .physical("load_inertia", shaft.inertia, "kg m^2")
         .physical("stiffness", shaft.stiffness, "N m/rad")
         .physical("damping_torque", shaft.damping, "N m s/rad")

@@ -157,11 +157,13 @@ impl Rig for TorqueAxis {
                 let spline = Twisting::swinging(self.load, frequency, ratio);
                 self.spline = Some(spline);
                 let doc = "a flexible spline between motor and load";
+                let loads = self.load / self.near();
+                let faster = f64::sqrt(1.0 + loads);
                 Some(
                     of.told(doc, &["inertia"])
-                        .fitted("ratio", self.load / self.near(), "1")
-                        .fitted("antiresonance", frequency, "rad/s")
-                        .fitted("damping", ratio, "1")
+                        .fitted("ratio", loads, "1")
+                        .fitted("resonance", faster * frequency, "rad/s")
+                        .fitted("damping", faster * ratio, "1")
                         .physical("stiffness", spline.stiffness, "N m/rad"),
                 )
             }
