@@ -6,7 +6,7 @@ use loopsight_model::model::ModelParameter;
 use nalgebra::DVector;
 
 use crate::error::FitError;
-use crate::prediction::{InitialStates, Solution};
+use crate::prediction::{InitialStates, Solution, estimated_states};
 use crate::problem::{Problem, declared};
 use crate::regression::batch;
 use crate::settings::FitSettings;
@@ -190,6 +190,7 @@ impl Problem<'_> {
         let mut starts = Vec::new();
         if self.model.missing_values().is_empty() {
             starts.extend(self.start("the file's values", self.model.values())?);
+            self.settle(&mut starts)?;
         }
         let mut failure = None;
         for span in SPANS {
@@ -234,6 +235,24 @@ impl Problem<'_> {
             states,
             cost,
         }))
+    }
+
+    /// Gives the start with the file's values the initial states that suit them, where that lowers its cost. A state that no
+    /// sensor reads begins anywhere else, and from there values that were right may go astray.
+    fn settle(&self, starts: &mut [Start]) -> Result<(), FitError> {
+        let (model, runs) = (self.model, self.runs);
+        let [start] = starts else { return Ok(()) };
+        let states = estimated_states(model, &start.values, runs).len();
+        if self.known_states.is_some() || states <= model.measured.len() {
+            return Ok(());
+        }
+        let states = InitialStates::estimate(model, &start.values, runs, &self.work)?.states;
+        let at = self.pack(&start.values, &states);
+        let cost = self.residual_vector(&at)?.norm_squared();
+        if cost < start.cost {
+            (start.states, start.cost) = (states, cost);
+        }
+        Ok(())
     }
 
     /// Starts scattered over the ranges of the parameters, or some decades around `values`, the best first.
