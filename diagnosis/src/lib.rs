@@ -124,6 +124,7 @@ mod score;
 mod search;
 mod settings;
 mod shows;
+mod sizes;
 mod solve;
 mod split;
 mod stamps;

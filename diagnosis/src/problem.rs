@@ -16,6 +16,7 @@ use crate::prediction::{
 };
 use crate::progress::{Cancelled, Work};
 use crate::score::Tally;
+use crate::sizes::sizes;
 
 /// Unknowns, weighted residuals there, and their Jacobian.
 type Linearised = (DVector<f64>, DVector<f64>, DMatrix<f64>);
@@ -32,6 +33,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) weights: Vec<f64>,
     /// Unknown = scaled unknown × scale.
     pub(crate) scales: Vec<f64>,
+    /// Size of each parameter of the model in these recordings.
+    sizes: Vec<f64>,
     pub(crate) lower: DVector<f64>,
     pub(crate) upper: DVector<f64>,
     /// Moving-average coefficient by signal; empty in the first pass.
@@ -100,11 +103,13 @@ impl<'a> Problem<'a> {
             Some(_) => Vec::new(),
             None => first_weights(model, runs, work.criteria()),
         };
+        let deviations: Vec<f64> = tallies.iter().map(Tally::std).collect();
+        let sizes = sizes(model, runs, &deviations);
         let mut scales = Vec::new();
         let mut lower = Vec::new();
         let mut upper = Vec::new();
         for &i in &free {
-            let (scale, [low, high]) = range(&model.parameters[i]);
+            let (scale, [low, high]) = range(&model.parameters[i], sizes[i]);
             scales.push(scale);
             lower.push(low / scale);
             upper.push(high / scale);
@@ -113,7 +118,7 @@ impl<'a> Problem<'a> {
         for _ in runs {
             for state in &visible {
                 let own = state.checked_sub(model.n_states()).map(|k| own[k]);
-                let range = own.map(|i| range(&model.parameters[i]));
+                let range = own.map(|i| range(&model.parameters[i], sizes[i]));
                 let (scale, [low, high]) =
                     range.unwrap_or((1.0, [f64::NEG_INFINITY, f64::INFINITY]));
                 scales.push(scale);
@@ -129,6 +134,7 @@ impl<'a> Problem<'a> {
             visible,
             weights,
             scales,
+            sizes,
             lower: DVector::from_vec(lower),
             upper: DVector::from_vec(upper),
             rounding: Vec::new(),
@@ -346,7 +352,7 @@ impl<'a> Problem<'a> {
                 let parameter = &self.model.parameters[*i];
                 Named {
                     name: &parameter.name,
-                    declared: parameter.scale(),
+                    declared: self.sizes[*i],
                     scale: *scale,
                 }
             })
@@ -383,8 +389,8 @@ impl<'a> Problem<'a> {
 }
 
 /// The size of a parameter, and its least and largest value.
-fn range(parameter: &ModelParameter) -> (f64, [f64; 2]) {
-    let scale = parameter.scale().max(parameter.value.map_or(0.0, f64::abs));
+fn range(parameter: &ModelParameter, size: f64) -> (f64, [f64; 2]) {
+    let scale = size.max(parameter.value.map_or(0.0, f64::abs));
     let (low, high) = parameter.declaration.bounds();
     (scale, [low, high])
 }
