@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use loopsight_model::model::ModelParameter;
 use nalgebra::DVector;
 
 use crate::error::FitError;
@@ -14,14 +13,8 @@ use crate::solve::Effort;
 
 /// Spans of the regressions that a fit may start from, s.
 const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
-/// Scattered starts. Each costs one free run; the best of them are followed.
-const SCATTERED: usize = 32;
-/// Where a parameter has no range, scattered starts reach this many decades above and below its value.
-const DECADES: f64 = 1.5;
-/// The same where the file gives no value: only the unit is known.
-const DECADES_UNKNOWN: f64 = 3.0;
 /// Most other starts that are tried, the best first.
-const OTHERS: usize = 6;
+pub(crate) const OTHERS: usize = 6;
 /// Effort spent on each start but the first.
 const SHORT: Effort = Effort {
     iterations: 12,
@@ -59,11 +52,11 @@ pub(crate) struct Arrived {
 }
 
 /// Values to begin with.
-struct Start {
-    from: String,
-    values: Vec<f64>,
-    states: Vec<DVector<f64>>,
-    cost: f64,
+pub(crate) struct Start {
+    pub(crate) from: String,
+    pub(crate) values: Vec<f64>,
+    pub(crate) states: Vec<DVector<f64>>,
+    pub(crate) cost: f64,
 }
 
 /// A start that was followed.
@@ -221,7 +214,7 @@ impl Problem<'_> {
     }
 
     /// A start with the initial states that its values suggest; none where its free run diverges.
-    fn start(&self, from: &str, values: Vec<f64>) -> Result<Option<Start>, FitError> {
+    pub(crate) fn start(&self, from: &str, values: Vec<f64>) -> Result<Option<Start>, FitError> {
         let states = match &self.known_states {
             Some(states) => states.clone(),
             None => InitialStates::guess(self.model, &values, self.runs).states,
@@ -254,82 +247,11 @@ impl Problem<'_> {
         }
         Ok(())
     }
-
-    /// Starts scattered over the ranges of the parameters, or some decades around `values`, the best first.
-    /// They are always the same ones.
-    fn scattered(&self, values: &[f64]) -> Result<Vec<Start>, FitError> {
-        let mut starts = Vec::new();
-        for k in 0..SCATTERED {
-            let mut scattered = values.to_vec();
-            for (dimension, i) in self.free.iter().enumerate() {
-                let parameter = &self.model.parameters[*i];
-                scattered[*i] = scatter(parameter, values[*i], spread(k, dimension));
-            }
-            let from = format!("scattered values, {} of {SCATTERED}", k + 1);
-            starts.extend(self.start(&from, scattered)?);
-        }
-        starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        starts.truncate(OTHERS);
-        Ok(starts)
-    }
-}
-
-/// One coordinate of the `k`-th of points that fill the unit cube evenly: the fractional part of `k` times the
-/// root of a prime (H. Niederreiter, 1992, "Random Number Generation and Quasi-Monte Carlo Methods", theorem
-/// 4.3).
-fn spread(k: usize, dimension: usize) -> f64 {
-    const PRIMES: [f64; 12] = [
-        2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0,
-    ];
-    let root = PRIMES[dimension % PRIMES.len()].sqrt() * (1 + dimension / PRIMES.len()) as f64;
-    ((k + 1) as f64 * root).fract()
-}
-
-/// The value of a parameter at the fraction `share` of its range.
-fn scatter(parameter: &ModelParameter, value: f64, share: f64) -> f64 {
-    let (low, high) = parameter.declaration.bounds();
-    if low.is_finite() && high.is_finite() && low < 0.0 {
-        return low + share * (high - low);
-    }
-    if low.is_finite() && high.is_finite() && low > 0.0 {
-        return low * (high / low).powf(share);
-    }
-    let size = if value == 0.0 {
-        parameter.scale()
-    } else {
-        value
-    };
-    // Where the sign is not known, one half of the shares gives negative values and the other positive ones.
-    let (sign, share) = if parameter.value.is_none() && low < 0.0 && high > 0.0 {
-        let negative = share < 0.5;
-        (if negative { -1.0 } else { 1.0 }, (2.0 * share).fract())
-    } else {
-        (size.signum(), share)
-    };
-    let decades = match parameter.value {
-        Some(_) => DECADES,
-        None => DECADES_UNKNOWN,
-    };
-    let value = sign * size.abs() * 10f64.powf(decades * (2.0 * share - 1.0));
-    parameter.declaration.nearest(value)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn scattered_points_fill_their_range() {
-        for dimension in 0..30 {
-            let mut eighths = [0; 4];
-            for k in 0..64 {
-                let share = spread(k, dimension);
-                assert!((0.0..1.0).contains(&share));
-                eighths[(4.0 * share) as usize] += 1;
-            }
-            assert!(eighths.iter().all(|n| *n >= 10), "{dimension}: {eighths:?}");
-        }
-    }
 
     #[test]
     fn a_fit_that_leaves_more_than_a_constant_has_not_arrived() {

@@ -120,6 +120,7 @@ mod regression;
 mod residual_force;
 mod rls;
 mod rounding;
+mod scatter;
 mod score;
 mod search;
 mod settings;

@@ -365,7 +365,10 @@ fn squares(predicted: &[f64], run: &Run) -> f64 {
     residuals(predicted, run).norm_squared()
 }
 
-fn least_squares(jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Option<DVector<f64>> {
+pub(crate) fn least_squares(
+    jacobian: &DMatrix<f64>,
+    residual: &DVector<f64>,
+) -> Option<DVector<f64>> {
     let gram = jacobian.tr_mul(jacobian);
     Some(pseudo_inverse(&gram)? * jacobian.tr_mul(residual))
 }

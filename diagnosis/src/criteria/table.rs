@@ -48,7 +48,7 @@ criteria! {
         /// Error of a fit without an observer below which none is needed.
         stands: f64 = 0.6 "1", Judgement: "the inputs alone then explain more than half of the signal";
         /// Error from which the model counts as not fitted: it leaves as much as a constant would.
-        hopeless: f64 = 1.0 "1", Derived: "the mean of the signal leaves 1";
+        hopeless: f64 = 0.99 "1", Derived: "the mean of the signal leaves 1, and one per cent of an error does not matter";
     }
 
     /// Verdicts on fitted parameters.
