@@ -150,7 +150,7 @@ proptest! {
         let test = TestKind::ALL[kind].0;
         let text = file(test, "Meters", &format!("\"slow-forward\":[{rows}]"));
         if let Ok(log) = read_sysid(&text, "l") {
-            let _ = (log.table(), log.notes(), log.model_toml());
+            let _ = (log.table(), log.notes(), log.model_toml(), log.without_rest());
         }
     }
 }
