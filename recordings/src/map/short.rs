@@ -12,37 +12,45 @@ const SAMPLES: usize = 100;
 
 /// Leaves out the short runs where the others are enough.
 pub(super) fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
-    let is_short = |run: &Run| {
+    let is_short = |run: &Run| run.duration() < SHORT_RUN;
+    let says_enough = |run: &Run| {
         let experiment = !run.name().is_empty() && !run.name().contains('#');
-        run.duration() < SHORT_RUN && !(experiment && run.len() >= SAMPLES)
+        experiment && run.len() >= SAMPLES
     };
-    let list = runs
-        .iter()
-        .enumerate()
-        .filter(|(_, run)| is_short(run))
-        .map(|(i, run)| match run.name() {
+    let list = |of: &dyn Fn(&Run) -> bool| {
+        let listed = (runs.iter().enumerate()).filter(|(_, run)| is_short(run) && of(run));
+        let shown = listed.map(|(i, run)| match run.name() {
             "" if runs.len() == 1 => format!("{:.2} s", run.duration()),
             "" => format!("run {} {:.2} s", i + 1, run.duration()),
             name => format!("`{name}` {:.2} s", run.duration()),
-        })
-        .collect::<Vec<_>>();
-    if list.is_empty() {
+        });
+        shown.collect::<Vec<_>>().join(", ")
+    };
+    let all = list(&|_| true);
+    if all.is_empty() {
         return (runs, None);
     }
     let moves = |run: &Run| (0..run.n_measured()).any(|s| faults::moves(run, s));
-    let enough = runs.iter().any(|run| !is_short(run) && moves(run));
+    let enough = (runs.iter()).any(|run| (!is_short(run) || says_enough(run)) && moves(run));
     let keep = !enough && runs.iter().any(|run| is_short(run) && moves(run));
-    let names: Vec<&str> = runs
-        .iter()
-        .filter(|run| is_short(run))
-        .map(|run| run.name())
-        .collect();
-    let (what, all_short) = (list.join(", "), names.len() == runs.len());
-    let shorter = format!("shorter than {SHORT_RUN} s: {what}");
+    let short = runs.iter().filter(|run| is_short(run));
+    let names: Vec<&str> = short.map(Run::name).collect();
+    let all_short = names.len() == runs.len();
+    let shorter = format!("shorter than {SHORT_RUN} s");
     let detail = match (all_short, keep) {
-        (true, _) => format!("every run is {shorter}"),
-        (_, true) => format!("{shorter}; kept, since nothing moves in the longer runs"),
-        _ => format!("{shorter}; left out"),
+        (true, _) => format!("every run is {shorter}: {all}"),
+        (_, true) => format!("{shorter}: {all}; kept, since nothing moves in the longer runs"),
+        _ => {
+            let out = list(&|run| !says_enough(run));
+            let kept = list(&says_enough);
+            let of = |list: &str, what: &str| (!list.is_empty()).then(|| format!("{list}; {what}"));
+            let parts = [
+                of(&out, "left out"),
+                of(&kept, &format!("kept for their {SAMPLES} samples and more")),
+            ];
+            let parts: Vec<String> = parts.into_iter().flatten().collect();
+            format!("{shorter}: {}", parts.join("; "))
+        }
     };
     let fault = Fault {
         kind: FaultKind::ShortRun,
@@ -50,7 +58,7 @@ pub(super) fn without_short_runs(runs: Vec<Run>) -> (Vec<Run>, Option<Fault>) {
         signal: String::new(),
         detail,
     };
-    let long = |run: &Run| all_short || keep || !is_short(run);
+    let long = |run: &Run| all_short || keep || !is_short(run) || says_enough(run);
     (runs.into_iter().filter(long).collect(), Some(fault))
 }
 
