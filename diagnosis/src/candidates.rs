@@ -5,6 +5,7 @@ use loopsight_model::model::{Attached, Model};
 use loopsight_model::registry;
 use loopsight_model::run::Run;
 
+use crate::commands::largest_inputs;
 use crate::criteria::SearchCriteria;
 use crate::ends::{Ends, limited};
 use crate::estimate::ParameterVerdict;
@@ -305,17 +306,6 @@ pub(crate) fn candidates(
         }
     }
     found
-}
-
-/// The largest value of each input of the plant, either way.
-pub(crate) fn largest_inputs(model: &Model, runs: &[Run]) -> Vec<f64> {
-    let of = |i: usize| {
-        let samples = runs
-            .iter()
-            .flat_map(move |run| (0..run.len()).map(move |k| run.input(k)[i]));
-        samples.fold(0.0, |largest: f64, u| largest.max(u.abs()))
-    };
-    (0..model.plant.inputs.len()).map(of).collect()
 }
 
 /// Sets the smoothing width of the last effect of `model` to `sign_width` times the flow in the recording, and

@@ -71,6 +71,7 @@ mod candidates;
 #[cfg(test)]
 mod chance;
 mod choose;
+mod commands;
 mod compare;
 mod conclude;
 mod conclusion;

@@ -1,9 +1,9 @@
 //! Whether the size of an effect is possible for what it is said to be.
 
-use loopsight_core::Place;
 use loopsight_model::run::Run;
 
-use crate::candidates::{Candidate, largest_inputs};
+use crate::candidates::Candidate;
+use crate::commands::{largest_at, largest_inputs};
 use crate::positions::Positions;
 
 /// Why, at these `values`, an effect cannot be what it says; none where it can.
@@ -22,10 +22,12 @@ pub(crate) fn implausible(candidate: &Candidate, values: &[f64], runs: &[Run]) -
     if sizes.is_empty() || Positions::matter_to(candidate.meta) {
         return None;
     }
-    let commands = largest_inputs(&candidate.model, runs);
-    let at = candidate.at.iter();
-    let largest = at
-        .map(|id| largest(candidate, id, &commands))
+    let model = &candidate.model;
+    let commands = largest_inputs(model, runs);
+    let channels = model.plant.channels.iter();
+    let largest = channels
+        .filter(|channel| candidate.at.contains(&channel.id))
+        .filter_map(|channel| largest_at(model, channel, &commands))
         .fold(f64::INFINITY, f64::min);
     sizes.into_iter().find_map(|i| {
         let parameter = &candidate.model.parameters[i];
@@ -35,22 +37,6 @@ pub(crate) fn implausible(candidate: &Candidate, values: &[f64], runs: &[Run]) -
             format!("{name}: {value:.3} {unit} is beyond the largest command, {largest:.3} {unit}")
         })
     })
-}
-
-/// The largest of the `commands` of the input that a channel is of, or of those in its unit where it is an effort; no number is
-/// larger than that of a channel without any.
-fn largest(candidate: &Candidate, id: &str, commands: &[f64]) -> f64 {
-    let plant = candidate.model.plant;
-    let Some(channel) = plant.channels.iter().find(|c| c.id == id) else {
-        return f64::INFINITY;
-    };
-    let acts = |i: &usize| match channel.place {
-        Place::Input(of) => of == *i,
-        Place::Effort(_) => plant.inputs[*i].unit == channel.unit,
-        _ => false,
-    };
-    let of_channel = (0..commands.len()).filter(acts).map(|i| commands[i]);
-    of_channel.reduce(f64::max).unwrap_or(f64::INFINITY)
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! How large a change of a parameter has to be to be noticed in a recording.
 
-use loopsight_core::{Channel, Place, Role};
+use loopsight_core::{Channel, Role};
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 
-use crate::candidates::largest_inputs;
+use crate::commands::{largest_at, largest_inputs};
 
 /// Share of the largest command that a change of a coefficient moves at least: far above rounding, and far below what an effect
 /// would be found by.
@@ -14,7 +14,7 @@ const FAINT: f64 = 1e-4;
 ///
 /// A declaration gives it, for machines that move by a radian or a metre. A coefficient of a power of a position or a speed is
 /// larger for a machine that moves by a millimetre: by 10⁹ with the cube. There it is what moves a noticeable share of the
-/// largest command in the unit of the channel, where the signal is measured.
+/// largest command in the unit of the channel, or of the channel's size where there is none, if the signal is measured.
 pub(crate) fn sizes(model: &Model, runs: &[Run], deviations: &[f64]) -> Vec<f64> {
     let mut sizes: Vec<f64> = model.parameters.iter().map(|p| p.scale()).collect();
     let mut largest = None;
@@ -29,7 +29,8 @@ pub(crate) fn sizes(model: &Model, runs: &[Run], deviations: &[f64]) -> Vec<f64>
             let largest = largest.get_or_insert_with(|| largest_inputs(model, runs));
             let size = &mut sizes[effect.first_parameter + own];
             let moves = *size * way;
-            let faint = FAINT * command(model, channel, largest);
+            let command = largest_at(model, channel, largest).filter(|command| *command > 0.0);
+            let faint = FAINT * command.unwrap_or(channel.size);
             if moves > 0.0 && moves < faint {
                 *size *= faint / moves;
             }
@@ -61,19 +62,6 @@ fn way(model: &Model, channel: &Channel, unit: &str, deviations: &[f64]) -> Opti
     };
     let first = of(ways.next()?)?;
     ways.try_fold(first, |product, next| Some(product * of(next)?))
-}
-
-/// The largest command in the unit of a channel; the channel's own size where none has it.
-fn command(model: &Model, channel: &Channel, largest: &[f64]) -> f64 {
-    let acts = |i: &usize| match channel.place {
-        Place::Input(of) => of == *i,
-        _ => model.plant.inputs[*i].unit == channel.unit,
-    };
-    let commands = (0..largest.len()).filter(acts).map(|i| largest[i]);
-    commands
-        .reduce(f64::max)
-        .filter(|largest| *largest > 0.0)
-        .unwrap_or(channel.size)
 }
 
 #[cfg(test)]

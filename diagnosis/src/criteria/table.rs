@@ -108,7 +108,7 @@ criteria! {
         /// Most starts of one candidate among them.
         looks_each: usize = 2 "1", Judgement: "an effect with many starts must not crowd the others out";
         /// Candidates that get a full fit.
-        finalists: usize = 9 "1", Judgement: "time: each costs a full fit or two";
+        finalists: usize = 10 "1", Judgement: "time: each costs a full fit or two";
         /// Least number of these, however far behind they are.
         finalists_at_least: usize = 4 "1", Judgement: "a short fit is only roughly right";
         /// Most sets of channels of one effect among these.
