@@ -71,7 +71,8 @@ impl Effect for ElasticCoupling {
             .nonlinear()
             .starting_at(&[10.0, 30.0, 90.0, 270.0]),
             Parameter::new("damping", "ζ", "1", "damping ratio of that swing")
-                .within(0.0, 2.0)
+                // A swing that is damped more has no resonance: it is a lag.
+                .within(0.0, core::f64::consts::FRAC_1_SQRT_2)
                 .or(0.1)
                 .nonlinear()
                 .scaled(0.1)
