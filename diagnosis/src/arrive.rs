@@ -43,6 +43,15 @@ pub struct Convergence {
     pub starts: Vec<Tried>,
 }
 
+/// Which starts a fit follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Starts {
+    /// Where the best one leaves much, the others as well.
+    All,
+    /// The best one alone: the model was fitted before, and one of its parts was exchanged.
+    Best,
+}
+
 /// Where a problem's solution lies, and how it was found.
 pub(crate) struct Arrived {
     /// Scaled unknowns.
@@ -91,6 +100,7 @@ impl Problem<'_> {
     pub(crate) fn arrive(
         &mut self,
         settings: &FitSettings,
+        starting: Starts,
         effort: Effort,
     ) -> Result<Arrived, FitError> {
         let criteria = self.work.criteria().start;
@@ -107,7 +117,7 @@ impl Problem<'_> {
                 "the free run diverges from every starting point".to_owned(),
             ));
         };
-        if best.error > criteria.poor {
+        if best.error > criteria.poor && starting == Starts::All {
             starts.truncate(OTHERS);
             if best.error > criteria.lost {
                 // Not around where it went astray.

@@ -3,6 +3,7 @@
 use loopsight_model::model::Model;
 use loopsight_recordings::{Fault, Severity};
 
+use crate::arrive::Starts;
 use crate::candidates::{Seen, candidates};
 use crate::conclude::{Evidence, REPORTED, conclude};
 use crate::conclusion::{Conclusion, Diagnosis, Level};
@@ -304,7 +305,7 @@ fn solve_plain(
     work: &Work<'_>,
 ) -> Result<(Plain, Losses), FitError> {
     let model = problem.model;
-    let arrived = problem.arrive(&FitSettings::default(), FINAL)?;
+    let arrived = problem.arrive(&FitSettings::default(), Starts::All, FINAL)?;
     let solution = problem.solution(&arrived.solution);
     let scaled = problem.pack(&solution.values, &solution.states);
     let cost = problem.residual_vector(&scaled)?.norm_squared();

@@ -10,7 +10,7 @@
 //! equal spans. Every other span has its window where inputs and measured signals vary most; the others have it in
 //! their middle, whatever happens there: rests are seen as well.
 //!
-//! Windows must show what the log shows. Where a measured signal varies less within them than from one to the next,
+//! Windows must show what the log shows. Where a measured signal varies less within them than from one to the next of a run,
 //! the log is slow, and they become twice as long and half as many until that is no longer so; in the end the whole
 //! log is read. This does not count for the integral of another state (an angle, a distance), which may drift
 //! without end.
@@ -25,7 +25,7 @@ use crate::score::Tally;
 /// Windows at first, and the samples of one.
 const WINDOWS: usize = 8;
 const LENGTH: usize = ENOUGH / 2 / WINDOWS;
-/// Least share of a signal's variance within the windows.
+/// Least share of a signal's variance within the runs that is within the windows.
 const WITHIN: f64 = 0.5;
 
 /// Windows of some runs.
@@ -46,7 +46,7 @@ impl Excerpt {
         (0..WINDOWS.ilog2())
             .map(|doubled| Self::with(runs, &spread, LENGTH << doubled))
             .take_while(|excerpt| 2 * excerpt.samples() <= samples)
-            .find(|excerpt| spread.is_seen_in(&excerpt.windows, model))
+            .find(|excerpt| are_seen_in(&excerpt.windows, runs, model))
     }
 
     fn samples(&self) -> usize {
@@ -150,36 +150,32 @@ impl Spread {
                 .map(|(i, all)| share(i, *all, Run::sample))
                 .sum::<f64>()
     }
+}
 
-    /// Whether every measured signal that is no integral varies within the windows as it does in the runs.
-    fn is_seen_in(&self, windows: &[Run], model: &Model) -> bool {
-        let is_integral = |signal: &Signal| {
-            let id = signal.id;
-            model
-                .plant
-                .integrals
-                .iter()
-                .any(|(_, integral)| *integral == id)
-        };
-        let samples: usize = windows.iter().map(Run::len).sum();
-        (self.measured.iter().enumerate())
-            .filter(|(i, all)| **all > 0.0 && !is_integral(model.measured[*i].signal))
-            .all(|(i, all)| {
-                let within: f64 = windows
-                    .iter()
-                    .map(|window| {
-                        let variance = variance((0..window.len()).map(|k| window.sample(k)[i]));
-                        let share = window.len() as f64 / samples as f64;
-                        if variance.is_finite() {
-                            share * variance
-                        } else {
-                            0.0
-                        }
-                    })
-                    .sum();
-                within >= WITHIN * all
-            })
-    }
+/// Whether every measured signal that is no integral varies within the windows as it does within the runs.
+fn are_seen_in(windows: &[Run], runs: &[Run], model: &Model) -> bool {
+    let is_integral = |signal: &Signal| {
+        let mut integrals = model.plant.integrals.iter();
+        integrals.any(|(_, integral)| *integral == signal.id)
+    };
+    (0..model.measured.len())
+        .filter(|i| !is_integral(model.measured[*i].signal))
+        .all(|i| within(windows, i) >= WITHIN * within(runs, i))
+}
+
+/// The variance of a measured signal within some runs, without that from one run to the next.
+fn within(runs: &[Run], signal: usize) -> f64 {
+    let samples: usize = runs.iter().map(Run::len).sum();
+    let share = |run: &Run| {
+        let variance = variance((0..run.len()).map(|k| run.sample(k)[signal]));
+        let share = run.len() as f64 / samples as f64;
+        if variance.is_finite() {
+            share * variance
+        } else {
+            0.0
+        }
+    };
+    runs.iter().map(share).sum()
 }
 
 #[cfg(test)]
@@ -245,5 +241,14 @@ mod tests {
         assert!(windows[0].len() > LENGTH, "{}", windows[0].len());
         let slower = [run(n, |k| (period(n) * k as f64).sin())];
         assert!(Excerpt::of(&model(), &slower).is_none());
+    }
+
+    /// One run goes forward and the other back: how far these are apart says nothing of what a window shows.
+    #[test]
+    fn runs_that_differ_are_read_by_windows_all_the_same() {
+        let n = 2 * ENOUGH;
+        let runs = [10.0, -10.0].map(|level| run(n, |k| level + (0.01 * k as f64).sin()));
+        let excerpt = Excerpt::of(&model(), &runs).unwrap();
+        assert_eq!(excerpt.windows[0].len(), LENGTH);
     }
 }

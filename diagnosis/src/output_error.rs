@@ -6,7 +6,7 @@ use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 
-use crate::arrive::{Arrived, Convergence};
+use crate::arrive::{Arrived, Convergence, Starts};
 use crate::error::FitError;
 use crate::fitted::Fit;
 use crate::gram::gram;
@@ -71,7 +71,7 @@ fn in_two_passes(problem: &mut Problem<'_>, settings: &FitSettings) -> Result<Fi
         solution,
         settled,
         tried,
-    } = problem.solve_in_two_passes(settings, effort)?;
+    } = problem.solve_in_two_passes(settings, Starts::All, effort)?;
     let mut fit = problem.result(&solution)?;
     let hopeless = problem.work.criteria().start.hopeless;
     let verdict = Convergence::of(fit.nrmse_fit, settled, tried, hopeless);
@@ -79,7 +79,8 @@ fn in_two_passes(problem: &mut Problem<'_>, settings: &FitSettings) -> Result<Fi
     Ok(fit)
 }
 
-/// The model with the values that [`fit`] finds with some `effort`, and nothing said of how well they are known.
+/// The model with the values that a fit from its best start finds with some `effort`, and nothing said of how well they are
+/// known.
 ///
 /// # Errors
 ///
@@ -93,7 +94,7 @@ pub(crate) fn fitted_values(
     let settings = FitSettings::default();
     let prepared = prepare(model, runs, &settings, work)?;
     let mut problem = Problem::new(&prepared.model, &prepared.runs, work.clone())?;
-    let arrived = problem.solve_in_two_passes(&settings, effort)?;
+    let arrived = problem.solve_in_two_passes(&settings, Starts::Best, effort)?;
     let mut fitted = problem.model.clone();
     fitted.set_values(&problem.values_at(&arrived.solution));
     Ok(fitted)
@@ -173,7 +174,7 @@ fn free_values(
 ) -> Result<Option<Vec<f64>>, Cancelled> {
     let arrived = || -> Result<(f64, Vec<f64>), FitError> {
         let mut problem = Problem::new(model, runs, work.silently())?;
-        let arrived = problem.arrive(settings, ROUND)?;
+        let arrived = problem.arrive(settings, Starts::All, ROUND)?;
         let error = problem.residual_vector(&arrived.solution)?.norm();
         Ok((error, problem.solution(&arrived.solution).values))
     };
@@ -235,9 +236,10 @@ impl Problem<'_> {
     fn solve_in_two_passes(
         &mut self,
         settings: &FitSettings,
+        starting: Starts,
         effort: Effort,
     ) -> Result<Arrived, FitError> {
-        let mut arrived = self.arrive(settings, effort)?;
+        let mut arrived = self.arrive(settings, starting, effort)?;
         let start = if let Some(start) = self.whiten(&arrived.solution)? {
             self.balance(start)?
         } else if self.reweigh_starts(&arrived.solution)? {

@@ -6,6 +6,7 @@ use loopsight_core::{Channel, Place, Shows};
 use loopsight_model::model::{Model, ModelParameter, Proposed};
 use loopsight_model::run::Run;
 
+use crate::arrive::Starts;
 use crate::candidates::Candidate;
 use crate::judge::nrmse;
 use crate::problem::{Problem, declared};
@@ -107,7 +108,9 @@ fn fitted_to(model: &Model, runs: &[Run], nominal: &Nominal<'_>) -> Option<Vec<f
     let seen = nominal.holdout.seen.as_deref();
     let work = nominal.work.silently();
     let mut problem = Problem::with(model, runs, seen, None, work).ok()?;
-    let arrived = problem.arrive(&FitSettings::default(), FINAL).ok()?;
+    let arrived = problem
+        .arrive(&FitSettings::default(), Starts::All, FINAL)
+        .ok()?;
     Some(problem.solution(&arrived.solution).values)
 }
 
