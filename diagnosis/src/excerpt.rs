@@ -43,10 +43,14 @@ impl Excerpt {
             return None;
         }
         let spread = Spread::of(runs);
+        let varying = varying(model, runs);
         (0..WINDOWS.ilog2())
             .map(|doubled| Self::with(runs, &spread, LENGTH << doubled))
             .take_while(|excerpt| 2 * excerpt.samples() <= samples)
-            .find(|excerpt| are_seen_in(&excerpt.windows, runs, model))
+            .find(|excerpt| {
+                let mut signals = varying.iter();
+                signals.all(|(i, all)| within(&excerpt.windows, *i) >= WITHIN * all)
+            })
     }
 
     fn samples(&self) -> usize {
@@ -152,15 +156,16 @@ impl Spread {
     }
 }
 
-/// Whether every measured signal that is no integral varies within the windows as it does within the runs.
-fn are_seen_in(windows: &[Run], runs: &[Run], model: &Model) -> bool {
+/// Measured signals that are no integrals, by index, and their variance within the runs.
+fn varying(model: &Model, runs: &[Run]) -> Vec<(usize, f64)> {
     let is_integral = |signal: &Signal| {
         let mut integrals = model.plant.integrals.iter();
         integrals.any(|(_, integral)| *integral == signal.id)
     };
     (0..model.measured.len())
         .filter(|i| !is_integral(model.measured[*i].signal))
-        .all(|i| within(windows, i) >= WITHIN * within(runs, i))
+        .map(|i| (i, within(runs, i)))
+        .collect()
 }
 
 /// The variance of a measured signal within some runs, without that from one run to the next.
