@@ -9,6 +9,7 @@ use crate::conclude::{Evidence, REPORTED, conclude};
 use crate::conclusion::{Conclusion, Diagnosis, Level};
 use crate::criteria::Criteria;
 use crate::discover::discovered;
+use crate::early::Finding;
 use crate::ending::{Read, finalists_on_all, plain_on_all};
 use crate::ends::ends;
 use crate::error::FitError;
@@ -121,6 +122,16 @@ impl Diagnosis {
     }
 }
 
+impl Diagnosis {
+    /// Tells what the fitted model leaves.
+    fn tell_compared(&self, work: &Work<'_>) {
+        work.know(|| Finding::Compared {
+            nrmse: self.nominal.nrmse,
+            floor: self.floor.nrmse,
+        });
+    }
+}
+
 /// Whether the log is faulty or too short to fit a model to. If so, that is the diagnosis.
 fn refused(
     diagnosis: &mut Diagnosis,
@@ -161,6 +172,7 @@ fn steps(
     diagnosis.floor.nrmse = floor(model, &holdout.judging(), &criteria.log);
 
     let plain = fit_plain(diagnosis, model, &holdout, work)?;
+    diagnosis.tell_compared(work);
     let moves = moves_starts(&plain.model, &plain.solution, runs, work)?;
     let nominal = Nominal {
         given: model,
@@ -188,6 +200,7 @@ fn steps(
     let holdout = Holdout::new(model, &all, test.as_deref(), &criteria.holdout);
     diagnosis.floor.nrmse = floor(model, &holdout.judging(), &criteria.log);
     let plain = plain_on_all(diagnosis, &nominal, &holdout, &first)?;
+    diagnosis.tell_compared(work);
     let nominal = Nominal {
         model: &plain.model,
         solution: &plain.solution,

@@ -9,6 +9,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::conclusion::{Diagnosis, Explanation};
+use crate::early::Finding;
 use crate::error::FitError;
 use crate::excerpt::Excerpt;
 use crate::explain::explain;
@@ -124,6 +125,7 @@ pub(crate) fn finalists_on_all(
             let (solution, fit) = taken_on(model, &start, nominal.holdout, nominal.work).ok()??;
             let judged = Judged::of(found.candidate.clone(), model, solution, nominal)?;
             let explanation = explain(&judged, &fit, nominal).ok()?;
+            work.know(|| Finding::Finalist((&explanation).into()));
             Some((judged, explanation))
         })
         .collect();

@@ -68,7 +68,7 @@ pub(crate) fn explain_look(judged: &Judged) -> Explanation {
 }
 
 /// The effect of a candidate, and where.
-fn place(candidate: &Candidate) -> EffectAt {
+pub(crate) fn place(candidate: &Candidate) -> EffectAt {
     EffectAt {
         effect: candidate.meta.id.to_owned(),
         at: candidate.at.iter().map(|c| (*c).to_owned()).collect(),

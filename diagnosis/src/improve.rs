@@ -3,6 +3,7 @@
 use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::Criteria;
 use crate::diagnose::{Aim, Discover, diagnose_for};
+use crate::early::Finding;
 use crate::error::{CompareError, FitError};
 use crate::estimate::stands_in;
 use crate::fit::fit;
@@ -78,7 +79,7 @@ fn improve_with(
                 Ok(Some(pair)) => {
                     diagnosis.lacks(&pair);
                     state.diagnoses.push(diagnosis);
-                    state.step(pair.first, round);
+                    state.step(pair.first, round, work);
                     known = Some(pair.second);
                     continue;
                 }
@@ -195,7 +196,8 @@ impl State {
     }
 
     /// Adds what the diagnosis of a `round` named.
-    fn step(&mut self, best: Explanation, round: usize) {
+    fn step(&mut self, best: Explanation, round: usize, work: &Work<'_>) {
+        work.in_round(round).know(|| Finding::Added((&best).into()));
         self.steps.push(ImprovementStep {
             added: Some(best.place),
             entries: best.entries,
@@ -215,7 +217,7 @@ impl State {
         measurements: &Measurements<'_>,
         work: &Work<'_>,
     ) -> Result<bool, FitError> {
-        self.step(best, round);
+        self.step(best, round, work);
         let stays = refine(
             &mut self.present,
             &mut self.steps,

@@ -79,6 +79,7 @@ pub mod criteria;
 mod derived;
 mod diagnose;
 mod discover;
+mod early;
 mod ending;
 mod ends;
 mod equivalent;
@@ -150,6 +151,7 @@ pub use conclusion::{Advice, Conclusion, Diagnosis, EffectAt, Explanation, Level
 pub use criteria::{Criteria, Criterion, Reason};
 pub use derived::Known;
 pub use diagnose::diagnose;
+pub use early::{Early, Finding, Fitted, Promised};
 pub use error::{CompareError, FitError};
 pub use estimate::{Estimate, OfRun, ParameterVerdict};
 pub use experiment::{

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use serde::Serialize;
 
 use crate::criteria::Criteria;
+use crate::early::{Early, Finding};
 
 /// What long work is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -92,6 +93,7 @@ impl CancelToken {
 pub struct Cancelled;
 
 type Report<'a> = &'a (dyn Fn(&Progress) + Sync);
+type Hear<'a> = &'a (dyn Fn(&Early) + Sync);
 
 /// How much some work has simulated, in samples: a measure of what it cost that depends neither on the machine nor on the
 /// number of threads. Divided by the samples of the log it is a number of runs.
@@ -124,6 +126,7 @@ struct Counts {
 #[derive(Clone)]
 pub struct Work<'a> {
     report: Option<Report<'a>>,
+    hear: Option<Hear<'a>>,
     token: CancelToken,
     counts: Arc<Counts>,
     round: usize,
@@ -134,6 +137,7 @@ impl Default for Work<'_> {
     fn default() -> Self {
         Self {
             report: None,
+            hear: None,
             token: CancelToken::new(),
             counts: Arc::default(),
             round: 0,
@@ -146,6 +150,7 @@ impl std::fmt::Debug for Work<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Work")
             .field("reports", &self.report.is_some())
+            .field("tells", &self.hear.is_some())
             .field("token", &self.token)
             .field("round", &self.round)
             .finish()
@@ -164,6 +169,13 @@ impl<'a> Work<'a> {
             report: Some(report),
             ..Self::default()
         }
+    }
+
+    /// The same work, which calls `hear` with what is known before it ends, from any of its threads.
+    #[must_use]
+    pub fn telling(mut self, hear: &'a (dyn Fn(&Early) + Sync)) -> Self {
+        self.hear = Some(hear);
+        self
     }
 
     /// The same work, stopped by `token`.
@@ -211,10 +223,11 @@ impl<'a> Work<'a> {
         self.token.is_cancelled()
     }
 
-    /// A part of the work without reports of progress; the same token stops it.
+    /// A part of the work that tells nothing; the same token stops it.
     pub(crate) fn silently(&self) -> Self {
         Self {
             report: None,
+            hear: None,
             ..self.clone()
         }
     }
@@ -233,6 +246,17 @@ impl<'a> Work<'a> {
             Err(Cancelled)
         } else {
             Ok(())
+        }
+    }
+
+    /// Tells what is known already.
+    pub(crate) fn know(&self, finding: impl FnOnce() -> Finding) {
+        if let Some(hear) = self.hear {
+            let round = self.round;
+            hear(&Early {
+                round,
+                finding: finding(),
+            });
         }
     }
 

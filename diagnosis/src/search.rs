@@ -9,7 +9,8 @@ use crate::both_ways::is_the_same_both_ways;
 use crate::candidates::Candidate;
 use crate::conclusion::Explanation;
 use crate::criteria::{Criteria, SearchCriteria};
-use crate::explain::explain;
+use crate::early::{Finding, Promised, TOLD};
+use crate::explain::{explain, place};
 use crate::judge::nrmse;
 use crate::progress::{Stage, Work};
 use crate::promise::Promises;
@@ -127,6 +128,9 @@ impl Search<'_> {
             .par_iter()
             .filter_map(|first| {
                 let found = self.finished(first.clone());
+                if let Some((_, explanation)) = &found {
+                    self.work.know(|| Finding::Finalist(explanation.into()));
+                }
                 self.tell(Stage::Finalists, &done, of);
                 found
             })
@@ -275,7 +279,23 @@ impl Search<'_> {
             taken[*i] <= criteria.looks_each
         });
         promising.truncate(criteria.looks);
+        self.work.know(|| self.promised(&promising));
         promising.into_iter().map(|(_, attempt)| attempt).collect()
+    }
+
+    /// The effects that promise most, each at its most promising place.
+    fn promised(&self, promising: &[(f64, Attempt)]) -> Finding {
+        let mut seen = BTreeSet::new();
+        let candidates = (promising.iter())
+            .map(|(cost, (i, _))| (cost, &self.all[*i]))
+            .filter(|(_, candidate)| seen.insert(candidate.meta.id))
+            .take(TOLD)
+            .map(|(cost, candidate)| Promised {
+                place: place(candidate),
+                nrmse: cost.sqrt(),
+            })
+            .collect();
+        Finding::Promised { candidates }
     }
 
     /// Makes the short fits of some attempts; `waiting` more are to come. What cannot come as near to the best so far as a

@@ -5,7 +5,7 @@ use loopsight_diagnosis::diagnose;
 use crate::answers::DiagnoseAnswer;
 use crate::error::Result;
 use crate::session::Session;
-use crate::watch::{Watch, watched};
+use crate::watch::{Watch, heard, watched};
 
 /// How a model is diagnosed.
 #[derive(Clone, Debug, Default)]
@@ -18,6 +18,7 @@ pub struct DiagnoseOptions {
 }
 
 watched!(DiagnoseOptions);
+heard!(DiagnoseOptions);
 
 impl DiagnoseOptions {
     /// Whether the answer has the series of numbers, sample by sample.

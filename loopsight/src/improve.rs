@@ -11,7 +11,7 @@ use crate::answers::{ImproveAnswer, Reported};
 use crate::error::Result;
 use crate::model::Model;
 use crate::session::{Data, Session};
-use crate::watch::{Watch, watched};
+use crate::watch::{Watch, heard, watched};
 
 /// How a model is improved.
 #[derive(Clone, Debug, Default)]
@@ -27,6 +27,7 @@ pub struct ImproveOptions {
 }
 
 watched!(ImproveOptions);
+heard!(ImproveOptions);
 
 impl ImproveOptions {
     /// Whether an expression is added where no effect of the library explains the rest.

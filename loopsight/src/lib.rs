@@ -138,4 +138,4 @@ pub use run::{ControlledNow, InputNow, LogTo, Loop, ParameterNow, RunOptions, Ru
 pub use send::SendOptions;
 pub use session::Session;
 pub use simulate::{Experiment, SimulateOptions};
-pub use watch::{CancelToken, Progress, Stage, Watch};
+pub use watch::{CancelToken, Early, Finding, Fitted, Progress, Promised, Stage, Watch};

@@ -1,18 +1,22 @@
-//! Progress of long work and how to stop it: a part of every options struct.
+//! Progress of long work, what is known before it ends, and how to stop it: a part of every options struct.
 
 use std::fmt;
 use std::sync::Arc;
 
 use loopsight_diagnosis::Work;
-pub use loopsight_diagnosis::{CancelToken, Progress, Stage};
+pub use loopsight_diagnosis::{CancelToken, Early, Finding, Fitted, Progress, Promised, Stage};
 
 /// A callback that gets the progress of long work.
 type Report = dyn Fn(&Progress) + Send + Sync;
 
-/// Who gets the progress of long work, and what stops it.
+/// A callback that gets what is known before long work ends.
+type Hear = dyn Fn(&Early) + Send + Sync;
+
+/// Who gets the progress of long work and what is known before it ends, and what stops it.
 #[derive(Clone, Default)]
 pub struct Watch {
     report: Option<Arc<Report>>,
+    hear: Option<Arc<Hear>>,
     cancel: CancelToken,
 }
 
@@ -21,6 +25,13 @@ impl Watch {
     #[must_use]
     pub fn reporting(mut self, report: impl Fn(&Progress) + Send + Sync + 'static) -> Self {
         self.report = Some(Arc::new(report));
+        self
+    }
+
+    /// Calls `hear` with what is known before the work ends, from any of the threads that work.
+    #[must_use]
+    pub fn telling(mut self, hear: impl Fn(&Early) + Send + Sync + 'static) -> Self {
+        self.hear = Some(Arc::new(hear));
         self
     }
 
@@ -33,9 +44,13 @@ impl Watch {
 
     /// As the engine wants it.
     pub(crate) fn work(&self) -> Work<'_> {
-        match &self.report {
+        let work = match &self.report {
             Some(report) => Work::reporting(report.as_ref()),
             None => Work::quiet(),
+        };
+        match &self.hear {
+            Some(hear) => work.telling(hear.as_ref()),
+            None => work,
         }
         .stopped_by(&self.cancel)
     }
@@ -49,6 +64,7 @@ impl fmt::Debug for Watch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Watch")
             .field("reports", &self.report.is_some())
+            .field("tells", &self.hear.is_some())
             .field("cancelled", &self.is_cancelled())
             .finish()
     }
@@ -86,3 +102,19 @@ macro_rules! watched {
     };
 }
 pub(crate) use watched;
+
+/// The setter that an options struct has whose work knows something before it ends.
+macro_rules! heard {
+    ($options:ident) => {
+        impl $options {
+            /// Calls `hear` with what is known before the work ends, from any of the threads that work: what the model
+            /// leaves, then what promises most, then each finalist.
+            #[must_use]
+            pub fn early(mut self, hear: impl Fn(&$crate::Early) + Send + Sync + 'static) -> Self {
+                self.watch = self.watch.telling(hear);
+                self
+            }
+        }
+    };
+}
+pub(crate) use heard;

@@ -14,7 +14,7 @@ use pyo3::types::PyDict;
 use crate::error::{raised, refused};
 use crate::log::Log;
 use crate::model::Model;
-use crate::watched::watched;
+use crate::watched::{Told, watched};
 
 /// Makes the page of an answer; the argument stands at its foot.
 type Page = dyn Fn(&str) -> String + Send + Sync;
@@ -204,10 +204,10 @@ impl IntoAnswer for ExperimentAnswer {
 /// Long work, watched, and its answer as Python gets it.
 pub(crate) fn long<A: IntoAnswer + Send>(
     py: Python<'_>,
-    progress: Option<&Bound<'_, PyAny>>,
+    told: Told<'_, '_>,
     work: impl FnOnce(Watch) -> loopsight::Result<A> + Send,
 ) -> PyResult<Answer> {
-    let answer = watched(py, progress, work)?;
+    let answer = watched(py, told, work)?;
     answered(py, Ok(answer))
 }
 

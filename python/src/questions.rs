@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use crate::answer::{Answer, long};
 use crate::error::{raised, refused};
 use crate::log::Log;
+use crate::watched::Told;
 
 fn plain<A: loopsight::Answer>(py: Python<'_>, answer: loopsight::Result<A>) -> PyResult<Answer> {
     answer
@@ -102,5 +103,5 @@ pub(crate) fn run(
             .watch(watch);
         session.run(&control, &options)
     };
-    long(py, None, work)
+    long(py, Told::default(), work)
 }

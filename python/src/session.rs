@@ -12,6 +12,7 @@ use crate::answer::{Answer, answered, long};
 use crate::error::{raised, refused};
 use crate::log::Log;
 use crate::model::Model;
+use crate::watched::Told;
 
 /// A model and the logs of one machine.
 #[pyclass(frozen, module = "loopsight._engine")]
@@ -82,7 +83,7 @@ impl Session {
             let options = CompareOptions::default().series(series).watch(watch);
             self.0.compare(&options)
         };
-        long(py, progress, work)
+        long(py, progress.into(), work)
     }
 
     fn fit(
@@ -115,7 +116,7 @@ impl Session {
             options = options.max_iterations(most);
         }
         let work = |watch| self.0.fit(&options.watch(watch));
-        long(py, progress, work)
+        long(py, progress.into(), work)
     }
 
     fn diagnose(
@@ -123,12 +124,13 @@ impl Session {
         py: Python<'_>,
         series: bool,
         progress: Progress<'_, '_>,
+        early: Progress<'_, '_>,
     ) -> PyResult<Answer> {
         let work = |watch| {
             let options = DiagnoseOptions::default().series(series).watch(watch);
             self.0.diagnose(&options)
         };
-        long(py, progress, work)
+        long(py, Told { progress, early }, work)
     }
 
     fn improve(
@@ -137,6 +139,7 @@ impl Session {
         discover: bool,
         series: bool,
         progress: Progress<'_, '_>,
+        early: Progress<'_, '_>,
     ) -> PyResult<Answer> {
         let work = |watch| {
             let options = ImproveOptions::default()
@@ -145,7 +148,7 @@ impl Session {
                 .watch(watch);
             self.0.improve(&options)
         };
-        long(py, progress, work)
+        long(py, Told { progress, early }, work)
     }
 
     fn add(&self, py: Python<'_>, effect: &str, at: Vec<String>) -> PyResult<Answer> {
@@ -178,7 +181,7 @@ impl Session {
         options.limit = limit;
         options.duration_s = duration_s;
         let work = |watch| self.0.experiment(&options.watch(watch));
-        long(py, progress, work)
+        long(py, progress.into(), work)
     }
 
     fn simulate(

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import loopsight as ls
 import numpy as np
@@ -321,6 +322,23 @@ def test_progress_reaches_a_callable_and_its_exception_stops_the_work() -> None:
 
     with pytest.raises(ValueError, match="enough"):
         ls.improve(MODEL, LOG, progress=stop)
+
+
+def test_what_is_known_early_is_told_in_order() -> None:
+    told: list[dict[str, Any]] = []
+    found = ls.improve(MODEL, LOG, early=told.append)
+    kinds = [known["finding"] for known in told if known["round"] == 0]
+    assert kinds[:3] == ["compared", "promised", "finalist"]
+    assert told[0]["nrmse"] == pytest.approx(found.to_dict()["steps"][0]["nrmse_test"])
+    assert len(told[1]["candidates"]) == 5
+    added = [known for known in told if known["finding"] == "added"]
+    assert added[0]["effect"] == found.to_dict()["steps"][1]["added"]["effect"]
+
+    def stop(_: object) -> None:
+        raise ValueError("enough")
+
+    with pytest.raises(ValueError, match="enough"):
+        ls.diagnose(MODEL, LOG, early=stop)
 
 
 def test_other_threads_run_meanwhile() -> None:

@@ -1,11 +1,14 @@
 //! No value that the types of the library `loopsight` allow makes it panic: arrays of odd lengths, times that
 //! run backwards, numbers that are none, text that is no TOML.
 
-use loopsight::answers::Answer as _;
+use std::sync::{Arc, Mutex};
+
+use loopsight::answers::{Answer as _, ImproveAnswer};
 use loopsight::{
-    AddOptions, Ask, CompareOptions, Experiment, ExperimentOptions, FitOptions, ImproveOptions,
-    Log, Loop, Method, Model, Session, SimulateOptions, explain,
+    AddOptions, Ask, CompareOptions, Early, Experiment, ExperimentOptions, Finding, FitOptions,
+    ImproveOptions, Log, Loop, Method, Model, Session, SimulateOptions, explain,
 };
+use loopsight_report::words::early::line;
 use proptest::collection::vec;
 use proptest::num::f64::ANY;
 use proptest::prelude::*;
@@ -144,10 +147,14 @@ fn the_error_to_report_is_that_on_a_log_apart() {
     let session = || Session::new(model(), read("mixed")).unwrap();
     let options = ImproveOptions::default();
     let apart = session().report(read("multi_level")).unwrap();
+    let told = Arc::new(Mutex::new(Vec::new()));
+    let heard = Arc::clone(&told);
+    let telling = (options.clone()).early(move |early| heard.lock().unwrap().push(early.clone()));
     let (found, without) = (
-        apart.improve(&options).unwrap(),
+        apart.improve(&telling).unwrap(),
         session().improve(&options).unwrap(),
     );
+    in_order(&told.lock().unwrap(), &found);
     assert!(without.reported.is_none());
     assert_eq!(found.steps, without.steps);
     let reported = found.reported.as_ref().unwrap();
@@ -155,4 +162,42 @@ fn the_error_to_report_is_that_on_a_log_apart() {
     let better = Session::new(found.model().unwrap().clone(), read("multi_level")).unwrap();
     let there = better.compare(&CompareOptions::default()).unwrap();
     assert!((reported.errors.nrmse / there.errors.nrmse - 1.0).abs() < 1e-3);
+}
+
+/// What an improvement told before its end, and in which order.
+fn in_order(told: &[Early], found: &ImproveAnswer) {
+    let first: Vec<&Finding> = (told.iter().filter(|early| early.round == 0))
+        .map(|early| &early.finding)
+        .collect();
+    let [
+        Finding::Compared { nrmse, floor },
+        Finding::Promised { candidates },
+        finalists @ ..,
+        Finding::Added(added),
+    ] = first.as_slice()
+    else {
+        unreachable!("{first:?}")
+    };
+    assert_eq!(*nrmse, found.steps[0].nrmse_test);
+    assert!(*floor < 0.1 * nrmse);
+    assert!(candidates.len() > 1 && candidates.is_sorted_by_key(|promised| promised.nrmse));
+    assert!(candidates[0].nrmse < 0.5 * nrmse);
+    let finalists: Vec<_> = finalists
+        .iter()
+        .map(|finding| match finding {
+            Finding::Finalist(fitted) => fitted,
+            other => unreachable!("{other:?}"),
+        })
+        .collect();
+    assert!(finalists.len() > 1);
+    assert!(finalists.iter().any(|fitted| fitted.place == added.place));
+    assert_eq!(added.place.effect, "coulomb_friction");
+    let lines: Vec<String> = told.iter().map(line).collect();
+    assert!(lines[0].starts_with("without more the model leaves "));
+    assert!(lines[1].contains("coulomb_friction (mass) "), "{lines:#?}");
+    assert!(
+        lines
+            .iter()
+            .any(|line| line.starts_with("added coulomb_friction (mass): "))
+    );
 }

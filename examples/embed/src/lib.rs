@@ -1,7 +1,7 @@
 //! A diagnosis inside another program, as an app or a page in a browser has it: no file, no terminal.
 
 use loopsight::answers::{DiagnoseAnswer, Verdict};
-use loopsight::{CancelToken, DiagnoseOptions, Log, Model, Progress, Result, Session};
+use loopsight::{CancelToken, DiagnoseOptions, Early, Log, Model, Progress, Result, Session};
 
 /// What is believed of the machine: a mass on a spring.
 const MODEL: &str = "name = \"bench\"\n[plant.oscillator]\nstiffness_per_mass = 30.0\n\
@@ -44,7 +44,7 @@ pub fn measured(seconds: f64) -> Result<Log> {
         .build()
 }
 
-/// Which effect does the model lack? Tells `report` how far it is; `stop` ends it.
+/// Which effect does the model lack? Tells `report` how far it is, and `hear` what it knows already; `stop` ends it.
 ///
 /// # Errors
 ///
@@ -53,9 +53,13 @@ pub fn diagnose(
     log: Log,
     stop: &CancelToken,
     report: impl Fn(&Progress) + Send + Sync + 'static,
+    hear: impl Fn(&Early) + Send + Sync + 'static,
 ) -> Result<DiagnoseAnswer> {
     let model = Model::from_toml("bench.toml", MODEL)?;
-    let options = DiagnoseOptions::default().progress(report).cancel(stop);
+    let options = DiagnoseOptions::default()
+        .progress(report)
+        .early(hear)
+        .cancel(stop);
     Session::new(model, log)?.diagnose(&options)
 }
 

@@ -1,7 +1,8 @@
-"""Progress of long work."""
+"""Progress of long work, and what is known before it ends."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -10,11 +11,18 @@ from ._optional import needed
 
 Progress = bool | Callable[[str, int, int], object]
 Report = Callable[[str, int, int], object]
+#: What gets each result that is known before long work ends.
+Early = Callable[[dict[str, Any]], object] | None
 
 
 def bars() -> Any:
     """Makes a bar."""
     return needed("progress bars need", "tqdm.auto").tqdm
+
+
+def hearing(early: Early) -> Callable[[str], object] | None:
+    """What gets the same as JSON."""
+    return None if early is None else lambda text: early(json.loads(text))
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from . import _engine
 from ._error import Error
 from ._log import Log
 from ._model import Model
-from ._progress import Progress, reporting
+from ._progress import Early, Progress, hearing, reporting
 from ._results import Comparison, Diagnosis, Fit, Improvement, Result, Run
 
 #: A model, the path of a model file, or ``None`` for a log that describes itself (SysId).
@@ -133,18 +133,21 @@ class Session:
             answer = self._engine.fit(method, regression, max_iterations, series, report)
         return Fit(answer, self._call("fit"))
 
-    def diagnose(self, *, series: bool = False, progress: Progress = False) -> Diagnosis:
+    def diagnose(self, *, series: bool = False, progress: Progress = False, early: Early = None) -> Diagnosis:
         """Which effect is missing? Every effect of the library is tried at every channel, and judged on
-        validation data. Arguments as for `compare`."""
+        validation data. ``early`` is called with each result that is known before the end. Other arguments as for
+        `compare`."""
         with reporting(progress) as report:
-            return Diagnosis(self._engine.diagnose(series, report), self._call("diagnose"))
+            return Diagnosis(self._engine.diagnose(series, report, hearing(early)), self._call("diagnose"))
 
-    def improve(self, *, discover: bool = False, series: bool = False, progress: Progress = False) -> Improvement:
+    def improve(
+        self, *, discover: bool = False, series: bool = False, progress: Progress = False, early: Early = None
+    ) -> Improvement:
         """Adds what is missing and refits, until nothing more is. `Result.model` is the model that came of
         it. With ``discover`` an expression for the missing force is added where no effect of the library explains
-        the rest. Other arguments as for `compare`."""
+        the rest. Other arguments as for `diagnose`."""
         with reporting(progress) as report:
-            return Improvement(self._engine.improve(discover, series, report), self._call("improve"))
+            return Improvement(self._engine.improve(discover, series, report, hearing(early)), self._call("improve"))
 
     def experiment(
         self,

@@ -40,6 +40,7 @@
 //! | [`comparison`] | a model compared with a log |
 //! | [`fit`] | parameters found from a log |
 //! | [`diagnosis`] | what a model lacks |
+//! | [`early`] | what is known before a diagnosis ends |
 //! | [`improvement`] | a model with what it lacked |
 //! | [`inventory`] | what is in a log |
 //! | [`plan`] | an experiment |
@@ -51,6 +52,7 @@
 mod advice;
 pub mod comparison;
 pub mod diagnosis;
+pub mod early;
 mod faults;
 pub mod feedforward;
 pub mod fit;
