@@ -2,7 +2,8 @@
 
 use loopsight_model::model::Model;
 
-use crate::conclusion::{Advice, Conclusion, EffectAt, Explanation};
+use crate::conclusion::{Advice, Conclusion, Explanation};
+use crate::effect_at::EffectAt;
 
 pub(crate) fn advice(
     model: &Model,

@@ -2,8 +2,9 @@
 
 use loopsight_core::PlaceKind;
 
-use crate::conclusion::{EffectAt, Explanation};
+use crate::conclusion::Explanation;
 use crate::criteria::{ChoiceCriteria, Criteria};
+use crate::effect_at::EffectAt;
 use crate::judge::{advantage, nrmse};
 use crate::trial::Judged;
 

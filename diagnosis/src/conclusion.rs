@@ -6,6 +6,8 @@ use loopsight_model::model::Model;
 use loopsight_recordings::Fault;
 use serde::Serialize;
 
+use crate::early::Fitted;
+use crate::effect_at::EffectAt;
 use crate::estimate::Estimate;
 use crate::observer::Correction;
 use crate::residual_force::ResidualForce;
@@ -38,15 +40,6 @@ pub enum Conclusion {
     NotFitted,
     /// The work was cancelled. What was found until then is reported, without a conclusion.
     Cancelled,
-}
-
-/// An effect at its channels.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct EffectAt {
-    /// Id of the effect.
-    pub effect: String,
-    /// Ids of the channels.
-    pub at: Vec<String>,
 }
 
 /// One way to explain what the model does not.
@@ -82,6 +75,15 @@ pub struct Explanation {
     /// Free-run error on what it was fitted to; NaN as `significance`.
     #[serde(skip)]
     pub nrmse_fit: f64,
+}
+
+impl From<&Explanation> for Fitted {
+    fn from(found: &Explanation) -> Self {
+        Self {
+            place: found.place.clone(),
+            nrmse: found.nrmse,
+        }
+    }
 }
 
 /// An experiment and what it is good for.

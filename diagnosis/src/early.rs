@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::conclusion::{EffectAt, Explanation};
+use crate::effect_at::EffectAt;
 
 /// Most candidates that are told with their promises.
 pub(crate) const TOLD: usize = 5;
@@ -64,13 +64,4 @@ pub struct Fitted {
     pub place: EffectAt,
     /// Its error.
     pub nrmse: f64,
-}
-
-impl From<&Explanation> for Fitted {
-    fn from(found: &Explanation) -> Self {
-        Self {
-            place: found.place.clone(),
-            nrmse: found.nrmse,
-        }
-    }
 }

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::candidates::Candidate;
-use crate::conclusion::{EffectAt, Explanation};
+use crate::conclusion::Explanation;
+use crate::effect_at::EffectAt;
 use crate::estimate::{Estimate, ParameterVerdict};
 use crate::fitted::Fit;
 use crate::judge::{nrmse, significance};

@@ -372,7 +372,7 @@ mod tests {
     use loopsight_plants as _;
 
     use super::*;
-    use crate::conclusion::EffectAt;
+    use crate::effect_at::EffectAt;
 
     #[test]
     fn a_step_that_leads_nowhere_is_taken_back() {

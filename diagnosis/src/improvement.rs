@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use crate::advice::to_tell_apart;
-use crate::conclusion::{Advice, Conclusion, Diagnosis, EffectAt};
+use crate::conclusion::{Advice, Conclusion, Diagnosis};
+use crate::effect_at::EffectAt;
 use crate::fitted::Fit;
 
 /// One step of an improvement.

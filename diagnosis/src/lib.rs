@@ -80,6 +80,7 @@ mod derived;
 mod diagnose;
 mod discover;
 mod early;
+mod effect_at;
 mod ending;
 mod ends;
 mod equivalent;
@@ -147,11 +148,12 @@ mod window;
 
 pub use arrive::{Convergence, Tried};
 pub use compare::{Comparison, RunTrace, SignalTrace, compare};
-pub use conclusion::{Advice, Conclusion, Diagnosis, EffectAt, Explanation, Level};
+pub use conclusion::{Advice, Conclusion, Diagnosis, Explanation, Level};
 pub use criteria::{Criteria, Criterion, Reason};
 pub use derived::Known;
 pub use diagnose::diagnose;
 pub use early::{Early, Finding, Fitted, Promised};
+pub use effect_at::EffectAt;
 pub use error::{CompareError, FitError};
 pub use estimate::{Estimate, OfRun, ParameterVerdict};
 pub use experiment::{

@@ -5,7 +5,8 @@ use rayon::prelude::*;
 
 use crate::candidates::smooth;
 use crate::compare::compare;
-use crate::conclusion::{Diagnosis, EffectAt};
+use crate::conclusion::Diagnosis;
+use crate::effect_at::EffectAt;
 use crate::error::FitError;
 use crate::estimate::{Estimate, strength_is_determined};
 use crate::fitted::Fit;

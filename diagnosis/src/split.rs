@@ -7,7 +7,7 @@ use loopsight_model::model::Model;
 use loopsight_model::registry;
 
 use crate::compare::compare;
-use crate::conclusion::EffectAt;
+use crate::effect_at::EffectAt;
 use crate::error::FitError;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
