@@ -120,9 +120,7 @@ impl Diagnosis {
             nominal_fit: f64::NAN,
         }
     }
-}
 
-impl Diagnosis {
     /// Tells what the fitted model leaves.
     fn tell_compared(&self, work: &Work<'_>) {
         work.know(|| Finding::Compared {

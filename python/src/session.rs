@@ -18,8 +18,8 @@ use crate::watched::Told;
 #[pyclass(frozen, module = "loopsight._engine")]
 pub struct Session(loopsight::Session);
 
-/// Long work of a session that answers `A`.
-type Progress<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+/// A function of the caller that long work calls, if there is one.
+type Callback<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
 #[pymethods]
 impl Session {
@@ -77,7 +77,7 @@ impl Session {
         &self,
         py: Python<'_>,
         series: bool,
-        progress: Progress<'_, '_>,
+        progress: Callback<'_, '_>,
     ) -> PyResult<Answer> {
         let work = |watch| {
             let options = CompareOptions::default().series(series).watch(watch);
@@ -93,7 +93,7 @@ impl Session {
         regression: Option<&str>,
         max_iterations: Option<u64>,
         series: bool,
-        progress: Progress<'_, '_>,
+        progress: Callback<'_, '_>,
     ) -> PyResult<Answer> {
         let mut options = FitOptions::default().series(series).method(match method {
             "output-error" => Method::OutputError,
@@ -123,8 +123,8 @@ impl Session {
         &self,
         py: Python<'_>,
         series: bool,
-        progress: Progress<'_, '_>,
-        early: Progress<'_, '_>,
+        progress: Callback<'_, '_>,
+        early: Callback<'_, '_>,
     ) -> PyResult<Answer> {
         let work = |watch| {
             let options = DiagnoseOptions::default().series(series).watch(watch);
@@ -138,8 +138,8 @@ impl Session {
         py: Python<'_>,
         discover: bool,
         series: bool,
-        progress: Progress<'_, '_>,
-        early: Progress<'_, '_>,
+        progress: Callback<'_, '_>,
+        early: Callback<'_, '_>,
     ) -> PyResult<Answer> {
         let work = |watch| {
             let options = ImproveOptions::default()
@@ -165,7 +165,7 @@ impl Session {
         limit: Option<f64>,
         period_s: f64,
         duration_s: Option<f64>,
-        progress: Progress<'_, '_>,
+        progress: Callback<'_, '_>,
     ) -> PyResult<Answer> {
         let ask = match (pin, separate, is_there) {
             (None, None, None) => Ask::All,
