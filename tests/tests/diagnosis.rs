@@ -272,23 +272,6 @@ fn one_thread_or_two_find_the_same() {
     assert_eq!(with(1), with(2));
 }
 
-/// Runs over the log that a diagnosis simulates: `docs/performance.md` has the same table. Where a change makes a
-/// diagnosis better for more runs, both are written anew.
-#[test]
-fn a_diagnosis_simulates_no_more_than_it_did() {
-    for (hidden, table) in [
-        (Hidden::CoulombFriction, [197, 367]),
-        (Hidden::LinearStiffness, [244, 257]),
-    ] {
-        let (_, counts) = counted(&log(&[(hidden, 1.0)], Experiment::Prbs, 1));
-        println!("{}: {counts:?} runs", hidden.id());
-        for (now, before) in counts.into_iter().zip(table) {
-            let (id, most) = (hidden.id(), before + before / 10);
-            assert!(now <= most, "{id}: {counts:?} runs, {table:?} in the table");
-        }
-    }
-}
-
 /// Real logs, where they are: friction of the drivetrains and of the flywheel.
 #[test]
 fn real_logs_show_their_friction() {
