@@ -1,7 +1,7 @@
 //! The candidates of a diagnosis: every effect at every channel where it could be added to the model.
 
 use loopsight_core::{EffectMeta, Parameter, Place, Role};
-use loopsight_model::model::{Attached, Model};
+use loopsight_model::model::{Attached, Model, Origin};
 use loopsight_model::registry;
 use loopsight_model::run::Run;
 
@@ -381,7 +381,7 @@ fn role_rms(model: &Model, effect: &Attached, role: Role, rms: &[f64]) -> f64 {
 }
 
 /// The widths that suit the recording, of all effects that have one, by index of the parameter.
-fn widths(model: &Model, rms: &[f64], sign_width: f64) -> Vec<(usize, f64)> {
+pub(crate) fn widths(model: &Model, rms: &[f64], sign_width: f64) -> Vec<(usize, f64)> {
     let of_effect = |effect: &Attached| {
         let width = sign_width * role_rms(model, effect, Role::Flow, rms);
         let declarations = effect.meta.parameters.iter().enumerate();
@@ -405,7 +405,9 @@ pub(crate) fn smooth(model: &mut Model, count: usize, width: f64) -> bool {
     for effect in model.effects.iter().rev().take(count) {
         for (i, declaration) in effect.meta.parameters.iter().enumerate() {
             if declaration.is_width() && width > 0.0 {
-                model.parameters[effect.first_parameter + i].value = Some(width);
+                let parameter = &mut model.parameters[effect.first_parameter + i];
+                parameter.value = Some(width);
+                parameter.origin = Origin::Log;
                 has = true;
             }
         }

@@ -10,7 +10,7 @@ use serde::Serialize;
 pub enum ParameterVerdict {
     /// Determined by the data.
     Good,
-    /// Not estimated: frozen at the value of the file.
+    /// Not estimated: frozen at the value of the file, or at one that suits the log where the file has none.
     #[serde(rename = "held")]
     Frozen,
     /// Has no influence on what is measured in this recording.
@@ -32,7 +32,7 @@ impl ParameterVerdict {
     pub fn text(self) -> &'static str {
         match self {
             ParameterVerdict::Good => "pinned by the data",
-            ParameterVerdict::Frozen => "frozen at the file's value",
+            ParameterVerdict::Frozen => "frozen, not estimated",
             ParameterVerdict::Dead => "no influence on what is measured here",
             ParameterVerdict::Flat => "only a combination with other parameters is determined",
             ParameterVerdict::NotPinned => "interval wider than the value",

@@ -106,6 +106,7 @@ mod levenberg_marquardt;
 mod long;
 mod measurements;
 mod motion;
+mod narrow;
 mod noise;
 mod observer;
 mod omitted;

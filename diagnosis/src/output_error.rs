@@ -10,6 +10,7 @@ use crate::arrive::{Arrived, Convergence, Starts};
 use crate::error::FitError;
 use crate::fitted::Fit;
 use crate::gram::gram;
+use crate::narrow::narrowed;
 use crate::noise;
 use crate::observer::{attach_observer_for, growth};
 use crate::prediction::InitialStates;
@@ -117,7 +118,8 @@ const ROUND: Effort = Effort {
     worth: None,
 };
 
-/// `model` and `runs` unchanged where the model can be simulated from the inputs alone.
+/// `model` and `runs` unchanged where the model can be simulated from the inputs alone, but for signs that suit the runs where
+/// the file leaves their widths open.
 ///
 /// Where it cannot, the runs get an observer, and the model gets the fitted values that the observer was made for.
 /// An observer that suits the model makes the errors white. Inputs from a feedback loop bias the parameters
@@ -128,7 +130,10 @@ pub(crate) fn prepare<'a>(
     settings: &FitSettings,
     work: &Work<'_>,
 ) -> Result<Prepared<'a>, FitError> {
-    let model = tied(model, runs, &work.criteria().log);
+    let mut model = tied(model, runs, &work.criteria().log);
+    if let Some(narrower) = narrowed(&model, runs, work)? {
+        model = Cow::Owned(narrower);
+    }
     let mut prepared = Prepared {
         runs: Cow::Borrowed(runs),
         model: model.clone(),

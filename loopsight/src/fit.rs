@@ -3,6 +3,7 @@
 use loopsight_core::Parameter;
 use loopsight_diagnosis::{Fit, FitSettings, fit};
 use loopsight_model::config::{PathSegment, TomlSource};
+use loopsight_model::model::Origin;
 use serde::Serialize;
 
 use crate::answers::FitAnswer;
@@ -140,7 +141,10 @@ impl Session {
             .parameters
             .iter()
             .zip(&self.model.composed.parameters)
-            .filter(|(new, old)| (old.free || old.per_run) && new.value != old.value)
+            .filter(|(new, old)| {
+                let found = old.free || old.per_run || new.origin == Origin::Log;
+                found && new.value != old.value
+            })
             .filter_map(|(new, _)| {
                 let error = fit.parameters.get(&new.name).and_then(|p| p.std_error);
                 let value = written(new.declaration, new.value?, error);

@@ -5,7 +5,7 @@ use loopsight_diagnosis::{
     improve,
 };
 use loopsight_model::config::{PathSegment, TomlSource};
-use loopsight_model::model::{Attached, Model as Composed, ModelParameter};
+use loopsight_model::model::{Attached, Model as Composed, ModelParameter, Origin};
 
 use crate::answers::{ImproveAnswer, Reported};
 use crate::error::Result;
@@ -163,7 +163,10 @@ fn improved_text(
     let is_tied = best.tied_names();
     let values: Vec<(Vec<PathSegment>, f64)> = pairs
         .into_iter()
-        .filter(|(_, from)| from.free || from.per_run || is_tied.contains(&from.name.as_str()))
+        .filter(|(_, from)| {
+            let tied = is_tied.contains(&from.name.as_str());
+            from.free || from.per_run || tied || from.origin == Origin::Log
+        })
         .filter_map(|(to, from)| Some((to.path.clone(), from.value?)))
         .collect();
     let text = present.with_values(&values);

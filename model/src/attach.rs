@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::config::{ConfigError, PathSegment, TomlSource, nearest};
-use crate::model::{Attached, ModelParameter, signal_index, signals};
+use crate::model::{Attached, ModelParameter, Origin, signal_index, signals};
 use crate::registry::{EffectPart, ReadyEffect};
 use loopsight_core::{Channel, EffectMeta, Place, PlantMeta, Role};
 
@@ -124,6 +124,7 @@ pub(crate) fn bind(
             declaration,
             unit,
             value: given.or(declaration.default.map(|d| d * size)),
+            origin: Origin::of(*given),
             free: declaration.estimated && acts,
             per_run: false,
             size,

@@ -25,7 +25,7 @@ pub use attached::{Attached, MeasuredSignal};
 pub use error::ModelError;
 pub use file::{FitTable, ModelFile, SimulationTable};
 pub use loopsight_core::{Tie, Unshown};
-pub use parameter::ModelParameter;
+pub use parameter::{ModelParameter, Origin};
 pub use proposed::Proposed;
 use proposed::proposed;
 pub(crate) use signals::signal_index;
@@ -118,6 +118,7 @@ impl Model {
                 declaration,
                 unit: declaration.unit.to_owned(),
                 value: given.or(declaration.default),
+                origin: Origin::of(*given),
                 free: declaration.estimated,
                 per_run: false,
                 size: 1.0,

@@ -15,6 +15,8 @@ pub struct ModelParameter {
     pub unit: String,
     /// Its value; `None` where neither file nor declaration give one: a fit has to find it.
     pub value: Option<f64>,
+    /// Where the value comes from that a fit begins with, or keeps.
+    pub origin: Origin,
     /// A fit estimates it.
     pub free: bool,
     /// It differs from run to run: a fit estimates it in each, and `free` is not set.
@@ -24,6 +26,24 @@ pub struct ModelParameter {
     pub size: f64,
     /// Where it stands in the file.
     pub path: Vec<PathSegment>,
+}
+
+/// Where a value comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// The model file says it.
+    File,
+    /// The file says none: it is the default of the declaration, if there is one.
+    Declaration,
+    /// The file says none: it suits a recording.
+    Log,
+}
+
+impl Origin {
+    /// Of a value that is `given` in a file, or not.
+    pub(crate) fn of(given: Option<f64>) -> Self {
+        given.map_or(Self::Declaration, |_| Self::File)
+    }
 }
 
 impl ModelParameter {

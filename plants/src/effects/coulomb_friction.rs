@@ -18,8 +18,9 @@ use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real, Ro
 /// On a channel about the vertical of a vehicle this is `scrub_friction`.
 ///
 /// The smoothing stands for the sign function, which no integrator with fixed steps can follow;
-/// `width` belongs well below the speeds of interest and is not estimated. At rest the model
-/// creeps instead of sticking.
+/// `width` belongs well below the speeds of interest and is not estimated. Where a model file has none,
+/// a fit takes a narrower one for a machine whose speeds are small. At rest the model creeps instead of
+/// sticking.
 ///
 /// Reference: C. A. Coulomb (1785), "Théorie des machines simples"; regularisation as in
 /// H. Olsson et al. (1998), "Friction models and friction compensation", European Journal of

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use loopsight_diagnosis::{Estimate, Fit, Method, OfRun, ParameterVerdict};
-use loopsight_model::model::{Model, Unshown};
+use loopsight_model::model::{Model, Origin, Unshown};
 
 use super::comparison;
 use super::number::{error, number};
@@ -28,6 +28,7 @@ pub fn summary(fit: &Fit) -> Vec<String> {
             .map(|(verdict, names)| format!("{}: {}.", names.join(", "), verdict.text())),
     );
     said.extend(not_shown(&fit.model));
+    said.extend(from_the_log(&fit.model));
     said.extend(fit.flat.iter().map(|flat| not_determined(flat) + "."));
     said
 }
@@ -62,6 +63,21 @@ pub(crate) fn not_shown(model: &Model) -> Vec<String> {
         )
     };
     model.tied_parts().map(sentence).collect()
+}
+
+/// Values that the model file leaves open and a fit does not estimate, which were taken from the log.
+fn from_the_log(model: &Model) -> Vec<String> {
+    let parameters = model.parameters.iter();
+    parameters
+        .filter(|p| p.origin == Origin::Log)
+        .filter_map(|p| {
+            let value = number(p.value?);
+            Some(format!(
+                "{} = {value} {}, which the model file leaves open, suits the speed in the log.",
+                p.name, p.unit
+            ))
+        })
+        .collect()
 }
 
 /// How the error fell, and what it is on a test log where there is one.
@@ -144,8 +160,8 @@ pub(crate) fn found(fit: &Fit) -> String {
     for (verdict, names) in by_verdict(&fit.parameters) {
         text.push_str(&format!("\n{}: {}", verdict.text(), names.join(", ")));
     }
-    for flat in &fit.flat {
-        text.push_str(&format!("\n{}", not_determined(flat)));
+    for said in (fit.flat.iter().map(|flat| not_determined(flat))).chain(from_the_log(&fit.model)) {
+        text.push_str(&format!("\n{said}"));
     }
     if !fit.per_run.is_empty() {
         text.push_str(&format!(

@@ -1,0 +1,117 @@
+//! Signs as sharp as the motion in a recording asks for, where a model file leaves that open.
+
+use loopsight_model::model::{Model, Origin};
+use loopsight_model::run::Run;
+
+use crate::arrive::Starts;
+use crate::candidates::widths;
+use crate::error::FitError;
+use crate::output_error::prepare;
+use crate::prediction::signal_rms;
+use crate::problem::Problem;
+use crate::progress::Work;
+use crate::settings::FitSettings;
+use crate::solve::Effort;
+
+/// How often a width may be the one that suits a recording. A mass on a spring with dry friction has its level within 0.3 %
+/// there, within 3 % at four times the width, and 62 % too high at forty times.
+const WIDER: f64 = 2.0;
+/// Most halvings.
+const HALVINGS: i32 = 3;
+/// Effort of a fit that shows how fast the machine moves.
+const SHORT: Effort = Effort {
+    iterations: 12,
+    tolerance: 1e-4,
+    worth: None,
+};
+
+/// `model` with narrower signs, where its file says no width and the default is too wide for a machine that moves as slowly as
+/// in `runs`. None where no width is left open or too wide.
+///
+/// A sign is smoothed as `tanh(flow/width)`, so dry friction of a machine that never moves faster than the width is viscous
+/// friction. The width is set to the share of the flow's root mean square that a diagnosis takes (`search.sign_width`), as a
+/// short fit of the model with its defaults has that flow, and halved while that lowers the error, as `improve` does with an
+/// effect that it adds. What the file says stays, and so does what is estimated.
+pub(crate) fn narrowed(
+    model: &Model,
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<Option<Model>, FitError> {
+    let open: Vec<usize> = (0..model.parameters.len())
+        .filter(|i| {
+            let parameter = &model.parameters[*i];
+            parameter.declaration.is_width()
+                && !parameter.free
+                && !parameter.per_run
+                && parameter.origin == Origin::Declaration
+        })
+        .collect();
+    if open.is_empty() {
+        return Ok(None);
+    }
+    let mut narrower = model.clone();
+    for i in &open {
+        narrower.parameters[*i].origin = Origin::Log;
+    }
+    match narrowed_if_wide(narrower, &open, runs, &work.silently()) {
+        Err(FitError::Cancelled(cancelled)) => Err(cancelled.into()),
+        // The fit itself will say why.
+        Err(_) => Ok(None),
+        Ok(narrower) => Ok(narrower),
+    }
+}
+
+/// `model` with the `open` widths that suit it.
+fn narrowed_if_wide(
+    mut model: Model,
+    open: &[usize],
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<Option<Model>, FitError> {
+    let criteria = work.criteria();
+    let (_, rms) = short_fit(&model, runs, work)?;
+    let suits = widths(&model, &rms, criteria.search.sign_width);
+    let wide = |(i, suits): &(usize, f64)| {
+        let value = model.parameters[*i].value;
+        open.contains(i) && suits.is_normal() && value.is_some_and(|v| v > WIDER * suits)
+    };
+    let wide: Vec<(usize, f64)> = suits.into_iter().filter(wide).collect();
+    if wide.is_empty() {
+        return Ok(None);
+    }
+    let set = |model: &mut Model, share: f64| {
+        for (i, suits) in &wide {
+            model.parameters[*i].value = format!("{:.1e}", share * suits).parse().ok();
+        }
+    };
+    set(&mut model, 1.0);
+    let (mut least, _) = short_fit(&model, runs, work)?;
+    for halvings in 1..=HALVINGS {
+        let mut sharper = model.clone();
+        set(&mut sharper, 0.5f64.powi(halvings));
+        let (error, _) = short_fit(&sharper, runs, work)?;
+        if error.is_nan() || error >= criteria.improve.sharper * least {
+            break;
+        }
+        (model, least) = (sharper, error);
+    }
+    Ok(Some(model))
+}
+
+/// Root of the cost that a short fit of `model` ends with, and the root mean squares of the signals there.
+fn short_fit(model: &Model, runs: &[Run], work: &Work<'_>) -> Result<(f64, Vec<f64>), FitError> {
+    let settings = FitSettings::default();
+    let prepared = prepare(model, runs, &settings, work)?;
+    let mut problem = Problem::new(&prepared.model, &prepared.runs, work.clone())?;
+    let arrived = problem.arrive(&settings, Starts::Best, SHORT)?;
+    let error = problem.residual_vector(&arrived.solution)?.norm();
+    let found = problem.solution(&arrived.solution);
+    let rms = signal_rms(
+        problem.model,
+        &found.values,
+        &found.states,
+        &prepared.runs,
+        work,
+    )?;
+    Ok((error, rms))
+}
