@@ -100,9 +100,10 @@ impl Drive {
         }
     }
 
-    /// True when it is ever different from zero in a run.
+    /// True when it differs from zero at a sample with another after it: what acts at the last one alone
+    /// is not measured any more.
     pub(crate) fn acts(self, run: &Run) -> bool {
-        (0..run.len()).any(|k| self.at(run, k) != 0.0)
+        (1..run.len()).any(|after| self.at(run, after - 1) != 0.0)
     }
 
     /// In words.

@@ -171,6 +171,26 @@ mod tests {
     }
 
     #[test]
+    fn a_drive_that_begins_with_the_last_sample_has_no_answer_yet() {
+        let starts_at = |first: f64| {
+            drive_log(move |run, row @ [t, ur, ul, r, _]| match run {
+                1 => [t, ur, if t < first { 0.0 } else { ul + 1.0 }, r, 0.0],
+                _ => row,
+            })
+        };
+        let end = drive_log(|_, row| row).runs[1]
+            .time()
+            .last()
+            .copied()
+            .unwrap();
+        assert_eq!(kinds(&starts_at(end - 1e-6)), []);
+        assert_eq!(
+            kinds(&starts_at(end / 2.0)),
+            [(FaultKind::ConstantSensor, "track_speed_left")]
+        );
+    }
+
+    #[test]
     fn nothing_moves() {
         let log = drive_log(|_, [t, ur, ul, _, _]| [t, ur, ul, 1.0, 2.0]);
         assert_eq!(kinds(&log), [(FaultKind::Motionless, "")]);
