@@ -67,6 +67,11 @@ pub struct Parameter {
     /// It is a limit of the position (or head), and a fit starts where that of the recording ends. A model file that does
     /// not give it has no such limit, and no fit looks for one.
     pub limits: Option<End>,
+    /// It belongs to a fuller form of its effect: a fit estimates it only where the model file gives it, and a diagnosis tries the
+    /// effect without it before it tries it with it.
+    pub further: bool,
+    /// At zero its effect is a simpler one: where a log does not determine it, that one is the explanation.
+    pub vanishing: bool,
     /// Sides on which it acts, see [`crate::Channel::side`]; empty: everywhere. Where an effect is attached to none of
     /// them, it is frozen in a fit.
     pub sides: &'static [i8],
@@ -105,6 +110,8 @@ impl Parameter {
             starts: &[],
             starts_in_durations: false,
             limits: None,
+            further: false,
+            vanishing: false,
             sides: &[],
             shown_by: None,
             bounds_channel: false,
@@ -174,6 +181,18 @@ impl Parameter {
     pub const fn starting_within(mut self, fractions: &'static [f64]) -> Self {
         self.starts = fractions;
         self.starts_in_durations = true;
+        self
+    }
+
+    /// Belongs to a fuller form of its effect.
+    pub const fn further(mut self) -> Self {
+        self.further = true;
+        self
+    }
+
+    /// At zero its effect is a simpler one.
+    pub const fn vanishing(mut self) -> Self {
+        self.vanishing = true;
         self
     }
 

@@ -96,6 +96,8 @@ fn separating(a: &str, b: &str) -> &'static str {
         "fast steps and a chirp up to the loop's bandwidth, sampled as fast as the sensor allows; for input against sensor delay, disturb the robot by hand: a disturbance passes the sensor only"
     } else if either(&["elastic_coupling"]) {
         "a chirp through the frequency at which it rings, small and large, and steps, sampled ten times in each swing: a spring rings at one frequency at any size"
+    } else if either(&["lugre_friction"]) {
+        "to and fro over ways of several lengths, some shorter than the friction takes to build up, very slowly and fast: a state of friction shows after each turn, its excess only where the motion creeps"
     } else if either(&["hysteresis"]) {
         "to and fro over ways of several lengths, from one side and from the other, slowly and again faster: a loop of hysteresis is as wide at any speed, and wider over longer ways"
     } else if either(&["end_stop", "overflow"]) {

@@ -21,6 +21,8 @@ pub(crate) struct Candidate {
     pub(crate) at: Vec<&'static str>,
     /// Each channel has parameters of its own; else they share them.
     pub(crate) separate: bool,
+    /// In its fuller form, with the parameters that are declared as [`Parameter::further`].
+    pub(crate) further: bool,
     /// The effect of the nominal model that it replaces, because it contains it: id, and indices of the
     /// parameters that are removed.
     pub(crate) replaces: Option<(&'static str, std::ops::Range<usize>)>,
@@ -59,12 +61,14 @@ impl Candidate {
         self.meta.id == other.meta.id
             && self.at == other.at
             && self.separate == other.separate
+            && self.further == other.further
             && self.replaces == other.replaces
     }
 
     /// Whether it is contained in another candidate at its place.
     pub(crate) fn is_special(&self, of: &Self) -> bool {
-        of.meta.simpler.contains(&self.meta.id) && of.at == self.at
+        let is_less = of.meta.id == self.meta.id && of.further && !self.further && !self.separate;
+        (is_less || of.meta.simpler.contains(&self.meta.id)) && of.at == self.at
     }
 
     /// The name of one of its own parameters, by index in the model, as it is reported.
@@ -83,7 +87,8 @@ impl Candidate {
         self.own()
             .filter(|i| {
                 let parameter = &self.model.parameters[*i];
-                parameter.free || !parameter.declaration.starts.is_empty()
+                let declaration = parameter.declaration;
+                parameter.free || !declaration.starts.is_empty() && !declaration.further
             })
             .count()
     }
@@ -273,8 +278,16 @@ pub(crate) fn candidates(
                 None => Some(model.clone()),
             };
             let each: Vec<&[&str]> = at.chunks(1).collect();
-            let ways: &[(bool, &[&[&str]])] = &[(false, &[&at]), (true, &each)];
-            for (separate, sets) in ways {
+            let ways: &[(bool, bool, &[&[&str]])] = &[
+                (false, false, &[&at]),
+                (true, false, &each),
+                (false, true, &[&at]),
+            ];
+            let has_further = meta.parameters.iter().any(|p| p.further);
+            for (separate, further, sets) in ways {
+                if *further && !has_further {
+                    continue;
+                }
                 let alike_only = own || meta.shared_only || meta.sided || replaces.is_some();
                 if *separate && (at.len() < 2 || alike_only) {
                     continue;
@@ -287,11 +300,16 @@ pub(crate) fn candidates(
                         flow = suit(model, rms, &largest, sign_width).max(flow);
                     }
                 }
-                if let Some(model) = with {
+                if let Some(mut model) = with {
+                    let own = model.effects.last().map_or(0, |e| e.first_parameter);
+                    for parameter in &mut model.parameters[own..] {
+                        parameter.free |= *further && parameter.declaration.further;
+                    }
                     found.push(Candidate {
                         meta,
                         at: at.clone(),
                         separate: *separate,
+                        further: *further,
                         replaces: replaces.clone(),
                         by_position: !observed && Positions::matter_to(meta),
                         widths: widths(&model, rms, sign_width),

@@ -5,6 +5,7 @@ use loopsight_core::PlaceKind;
 use crate::conclusion::Explanation;
 use crate::criteria::{ChoiceCriteria, Criteria};
 use crate::effect_at::EffectAt;
+use crate::estimate::ParameterVerdict;
 use crate::judge::{advantage, nrmse};
 use crate::trial::Judged;
 
@@ -86,6 +87,18 @@ pub(crate) fn choose(
             let key = |i: usize| (rarity(i), channels(i));
             key(*a).cmp(&key(*b)).then(error(*a).total_cmp(&error(*b)))
         })?;
+    let determined = |i: usize| {
+        (explanations[i].parameters.values()).all(|e| e.verdict == ParameterVerdict::Good)
+    };
+    // It comes in its fuller form where that does better and is determined.
+    let simplest_form = complexity(chosen);
+    let named = &finalists[chosen].candidate;
+    let fuller = (0..finalists.len()).find(|i| {
+        let form = &finalists[*i].candidate;
+        let is_fuller = form.meta.id == named.meta.id && named.is_special(form);
+        is_fuller && may(i) && determined(*i) && !same(chosen, *i)
+    });
+    let chosen = fuller.unwrap_or(chosen);
     // An effect that does as well as the chosen one on the validation data counts too.
     let unseen = |i: usize| nrmse(&finalists[i].losses);
     let id = |i: usize| finalists[i].candidate.meta.id;
@@ -95,9 +108,17 @@ pub(crate) fn choose(
     };
     let significant = criteria.missing.significant;
     let does_something = |i: usize| explanations[i].significance > significant;
+    // One with more parameters is an alternative where it does better with all of them, and the chosen one is no case of it.
+    let rivals = |i: usize| {
+        let contains = finalists[chosen]
+            .candidate
+            .is_special(&finalists[i].candidate);
+        !contains && error(i) <= error(chosen) && determined(i)
+    };
     let class: Vec<EffectAt> = (0..finalists.len())
         .filter(|i| not_worse.contains(i) || as_well(*i))
-        .filter(|i| *i != chosen && complexity(*i) <= complexity(chosen))
+        .filter(|i| *i != chosen && (complexity(*i) <= simplest_form || rivals(*i)))
+        .filter(|i| explanations[*i].place != explanations[chosen].place)
         // An effect of no size explains nothing, so it is no alternative.
         .filter(|i| does_something(*i) || !does_something(chosen))
         .map(|i| explanations[i].place.clone())

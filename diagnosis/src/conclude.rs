@@ -63,8 +63,25 @@ pub(crate) fn conclude(
     };
     let model = evidence.nominal.model;
     diagnosis.advice = advice(model, verdict, explanations.first(), explained);
+    once_each(explanations);
     explanations.truncate(REPORTED);
     verdict
+}
+
+/// Of an effect in its usual form and in its fuller one the better of both: they have the same parameters.
+fn once_each(explanations: &mut Vec<Explanation>) {
+    let mut kept: Vec<Explanation> = Vec::new();
+    for explanation in explanations.drain(..) {
+        let again = |other: &Explanation| {
+            other.place == explanation.place
+                && other.together_with == explanation.together_with
+                && other.parameters.keys().eq(explanation.parameters.keys())
+        };
+        if !kept.iter().any(again) {
+            kept.push(explanation);
+        }
+    }
+    *explanations = kept;
 }
 
 impl Evidence<'_> {

@@ -49,6 +49,7 @@ fn candidate(expression: &ForceExpression, nominal: &Nominal<'_>) -> Option<Cand
         meta,
         at: added.iter().flat_map(|e| &e.at).map(|c| c.id).collect(),
         separate: added.len() > 1,
+        further: false,
         replaces: None,
         flow: 0.0,
         reach: 0.0,

@@ -135,6 +135,7 @@ mod split;
 mod stamps;
 mod starts;
 mod stride;
+mod substance;
 mod sufficiency;
 #[cfg(test)]
 mod swing;

@@ -54,6 +54,7 @@ mod tests {
             meta: model.effects[0].meta,
             at: vec![at],
             separate: false,
+            further: false,
             replaces: None,
             flow: 1.0,
             reach: 1.0,

@@ -15,6 +15,7 @@ use crate::judge::nrmse;
 use crate::progress::{Stage, Work};
 use crate::promise::Promises;
 use crate::starts::{Extent, first_starts, fresh_starts, starts_from};
+use crate::substance::{does_something, is_a_simpler_one};
 use crate::trial::{Judged, Nominal, finish, look};
 
 /// Short fits that are made to their end whatever they find. They show how far the others have to come.
@@ -154,14 +155,16 @@ impl Search<'_> {
     }
 
     /// The full fit of a candidate. An effect whose fitted size is nothing explains nothing, whatever the other
-    /// parameters gained; nor does a shift in time that the stamps may have of their own, nor directions that are alike.
+    /// parameters gained; nor does a shift in time that the stamps may have of their own, nor directions that are alike, nor
+    /// what is a simpler effect for all that the log shows.
     fn finished(&self, first: Judged) -> Option<(Judged, Explanation)> {
         let (judged, fit) = finish(first, self.nominal)?;
         let explanation = explain(&judged, &fit, self.nominal).ok()?;
         let criteria = self.work.criteria();
         let stands_in = is_the_same_both_ways(&judged.candidate, &explanation, criteria);
         let acts = does_something(&explanation, criteria.search.does_nothing, self.shift);
-        (acts && !stands_in).then_some((judged, explanation))
+        let simpler = is_a_simpler_one(&judged.candidate, &explanation);
+        (acts && !stands_in && !simpler).then_some((judged, explanation))
     }
 
     /// Special cases of the best of `finalists` that ended behind it, fitted anew from where it ended: what it found,
@@ -210,7 +213,7 @@ impl Search<'_> {
     fn looked_at(&self) -> Vec<(usize, Judged)> {
         let extent = Extent::of(self.nominal.holdout.runs);
         let attempts: Vec<Attempt> = (self.all.iter().enumerate())
-            .filter(|(_, c)| !c.separate)
+            .filter(|(_, c)| !c.separate && !c.further)
             .flat_map(|(i, c)| {
                 let starts = first_starts(c, self.nominal.model, extent);
                 let fresh = fresh_starts(c, self.nominal, extent);
@@ -245,7 +248,7 @@ impl Search<'_> {
     fn looked_at_from_given(&self) -> Vec<(usize, Judged)> {
         let extent = Extent::of(self.nominal.holdout.runs);
         let attempts: Vec<Attempt> = (self.all.iter().enumerate())
-            .filter(|(_, c)| !c.separate && c.replaces.is_none())
+            .filter(|(_, c)| !c.separate && !c.further && c.replaces.is_none())
             .filter_map(|(i, c)| {
                 let starts = first_starts(c, self.nominal.given, extent);
                 Some((i, starts.into_iter().next()?))
@@ -343,14 +346,15 @@ impl Search<'_> {
     }
 
     /// Whether a candidate should start from where another one ended. Strong breakaway friction is found when
-    /// starting from dry friction, not from none; a level for each wheel from one level for both.
+    /// starting from dry friction, not from none; a level for each wheel from one level for both. A fuller form of an effect
+    /// starts from its usual one.
     fn grows(&self, i: usize, from: usize) -> bool {
         let (candidate, other) = (&self.all[i], &self.all[from]);
         let contains =
             other.is_special(candidate) && !candidate.separate && candidate.replaces.is_none();
-        let divides =
-            candidate.separate && candidate.meta.id == other.meta.id && candidate.at == other.at;
-        (contains || divides) && !other.separate
+        let itself = candidate.meta.id == other.meta.id && candidate.at == other.at;
+        let divides = candidate.separate && itself;
+        (contains || divides) && (itself || !candidate.further) && !other.separate
     }
 
     /// Attempts at candidates that were not tried yet, starting from where simpler ones ended. They are taken
@@ -391,36 +395,6 @@ impl Search<'_> {
         }
         attempts
     }
-}
-
-/// Whether an effect has any size: a parameter whose neutral value is zero is above the share `least` of its
-/// noticeable size, a time above `shift` (s). Where it has none, any parameter must be as far from its neutral value.
-fn does_something(explanation: &Explanation, least: f64, shift: f64) -> bool {
-    let model = &explanation.model;
-    let place = &explanation.place;
-    let own = model.effects.iter().filter(|effect| {
-        effect.meta.id == place.effect
-            && effect
-                .at
-                .iter()
-                .all(|c| place.at.iter().any(|at| at == c.id))
-    });
-    let free: Vec<_> = own
-        .flat_map(|effect| {
-            let parameters = model.parameters.iter().skip(effect.first_parameter);
-            parameters.take(effect.meta.parameters.len())
-        })
-        .filter(|p| p.free)
-        .collect();
-    let has_size = free.iter().any(|p| p.declaration.default == Some(0.0));
-    free.iter()
-        .filter(|p| !has_size || p.declaration.default == Some(0.0))
-        .any(|p| {
-            let away = p.value.zip(p.declaration.default);
-            let shift = if p.unit == "s" { shift } else { 0.0 };
-            let enough = shift.max(least * p.scale());
-            away.is_none_or(|(value, neutral)| (value - neutral).abs() > enough)
-        })
 }
 
 /// The least error among some candidates.

@@ -128,10 +128,18 @@ fn measured_at(model: &Model, at: &[&str]) -> Vec<usize> {
 pub(crate) fn starts_from(candidate: &Candidate, other: &Judged, extent: Extent) -> Vec<Vec<f64>> {
     let own = other.candidate.own();
     let values = &other.solution.values;
-    let declarations = other.candidate.meta.parameters.iter();
-    let known = declarations
-        .map(|declaration| declaration.id)
-        .zip(values[own.clone()].iter().copied())
+    let meant = |i: &usize| {
+        let parameter = &other.candidate.model.parameters[*i];
+        parameter.free || !parameter.declaration.further
+    };
+    let known = (own.clone().take(other.candidate.meta.parameters.len()))
+        .filter(meant)
+        .map(|i| {
+            (
+                other.candidate.model.parameters[i].declaration.id,
+                values[i],
+            )
+        })
         .collect();
     starts(candidate, &values[..own.start], &known, extent)
 }
@@ -151,12 +159,15 @@ fn starts(
         let nearest = |value: f64| parameter.declaration.nearest(value);
         let neutral = parameter.value.unwrap_or(0.0);
         let listed = extent.starts(parameter);
+        let held = parameter.declaration.further && !parameter.free;
         if listed.is_empty() && !parameter.declaration.starts.is_empty() {
             return Vec::new();
         }
         let limits = parameter.declaration.limits.filter(|_| parameter.free);
         let at_end = limits.and_then(|end| candidate.ends[end as usize]);
-        let values: Vec<f64> = if let Some(value) = known.get(parameter.declaration.id) {
+        let values: Vec<f64> = if held {
+            vec![neutral]
+        } else if let Some(value) = known.get(parameter.declaration.id) {
             vec![*value]
         } else if let Some(end) = at_end {
             end.starts.map(nearest).to_vec()
@@ -181,6 +192,8 @@ fn starts(
             let unit = match parameter.declaration.unit {
                 "1/position" if candidate.reach > 0.0 => candidate.reach,
                 "1/flow" if candidate.flow > 0.0 => candidate.flow,
+                // Ways on which something happens are those of so many seconds.
+                "position" if candidate.flow > 0.0 => 1.0 / candidate.flow,
                 _ => 1.0,
             };
             listed.into_iter().map(|v| nearest(v / unit)).collect()

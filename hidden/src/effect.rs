@@ -69,6 +69,7 @@ effects! {
     EndStop "end_stop" Axis "rubber stops at both ends of the way",
     Overflow "overflow" TankPair "an upper tank that runs over its edge",
     Hysteresis "hysteresis" Axis "a rubber joint to the ground, whose force depends on the way it came",
+    LugreFriction "lugre_friction" Axis "a seal whose lips bend before they slide",
     CentrifugalOffset "centrifugal_offset" Twil "centre of mass ahead of the axle",
     WheelSlip "wheel_slip" Twil "tyres on a slippery floor; odometry from undriven measuring wheels",
     DeadZone "dead_zone" Twil "amplifiers that do nothing below a threshold",

@@ -21,6 +21,7 @@
 //! ```
 
 mod amplifier;
+mod bristles;
 mod contact;
 mod delay;
 mod driven;

@@ -248,6 +248,7 @@ impl Machine {
             if physics.robot == Driven::Axis {
                 torque += physics.load.torque(wheel_angle);
                 torque -= physics.joint.moved(0.5 * STEP * wheel).force;
+                torque -= physics.seal.moved(wheel, 0.5 * STEP).torque;
                 if let Some(stops) = physics.stops {
                     torque += stops.force(wheel_angle, wheel);
                 }
@@ -335,6 +336,7 @@ impl Machine {
             self.wheel_angles[k] += STEP * wheel;
             if k == 0 {
                 self.physics.joint = self.physics.joint.moved(STEP * wheel);
+                self.physics.seal = self.physics.seal.moved(wheel, STEP);
                 self.twist += STEP * (wheel - mean.far);
             }
             self.rotor_angles[k] += STEP * mean.rotor[k];

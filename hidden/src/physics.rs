@@ -1,6 +1,7 @@
 //! Everything a machine is made of, effects included.
 
 use crate::amplifier::AmplifierParts;
+use crate::bristles::Bristles;
 use crate::contact::{Gap, Stops, Twisting, Tyre};
 use crate::driven::{Body, Driven, Motor};
 use crate::friction::Friction;
@@ -89,6 +90,8 @@ pub(crate) struct Physics {
     pub(crate) load: Load,
     /// Between the shaft of the axis and the ground.
     pub(crate) joint: Hysteresis,
+    /// On the shaft of the axis.
+    pub(crate) seal: Bristles,
     /// Of the axis.
     pub(crate) stops: Option<Stops>,
     pub(crate) slope: Option<Slope>,
@@ -123,6 +126,7 @@ impl Physics {
             tyre: None,
             load: Load::default(),
             joint: Hysteresis::default(),
+            seal: Bristles::default(),
             stops: None,
             slope: None,
             mass_offset: 0.0,

@@ -107,10 +107,9 @@ impl Robot {
     /// [`Experiment::MultiLevel`].
     pub fn lesson(self, hidden: Option<Hidden>) -> Experiment {
         match (self.kind(), hidden) {
-            // A pseudo-random binary sequence never rests at zero and has one size.
-            (_, Some(Hidden::BridgeCoast | Hidden::PulseCoast)) | (Kind::Rig(_), _) => {
-                Experiment::Mixed
-            }
+            // A pseudo-random binary sequence never rests at zero, never creeps and has one size.
+            (_, Some(Hidden::BridgeCoast | Hidden::PulseCoast | Hidden::LugreFriction))
+            | (Kind::Rig(_), _) => Experiment::Mixed,
             (Kind::Driven(_), _) => Experiment::Prbs,
         }
     }

@@ -135,8 +135,10 @@ fn improved_text(
         let own = best.parameters.iter().skip(effect.first_parameter);
         let parameters: Vec<(&str, f64)> = own
             .zip(effect.meta.parameters)
-            // A limit that was not found is not there.
-            .filter(|(parameter, declaration)| parameter.free || declaration.limits.is_none())
+            // A limit that was not found is not there, nor is a fuller form.
+            .filter(|(parameter, declaration)| {
+                parameter.free || declaration.limits.is_none() && !declaration.further
+            })
             .filter_map(|(parameter, declaration)| Some((declaration.id, parameter.value?)))
             .collect();
         edit(&|present| present.with_effect(effect.meta.id, &at, &parameters));

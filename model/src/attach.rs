@@ -20,10 +20,12 @@ pub(crate) fn attach(
     let (ready, at) = placed(plant, part, &base, source, effects)?;
     let given = ready.given.clone();
     let attached = bind(plant, ready, at, &base, parameters);
-    // A limit that the file does not give is not there.
+    // A limit that the file does not give is not there, and a fuller form is one that the file gives.
     let own = &mut parameters[attached.first_parameter..];
     for (parameter, given) in own.iter_mut().zip(given) {
-        parameter.free &= parameter.declaration.limits.is_none() || given.is_some();
+        let declaration = parameter.declaration;
+        parameter.free &= declaration.limits.is_none() || given.is_some();
+        parameter.free |= declaration.further && declaration.estimated && given.is_some();
     }
     Ok(attached)
 }
@@ -125,7 +127,7 @@ pub(crate) fn bind(
             unit,
             value: given.or(declaration.default.map(|d| d * size)),
             origin: Origin::of(*given),
-            free: declaration.estimated && acts,
+            free: declaration.estimated && acts && !declaration.further,
             per_run: false,
             size,
             path: base.iter().cloned().chain(path).collect(),
@@ -151,20 +153,27 @@ pub(crate) fn bind(
 /// The unit of an effect's parameter at a channel, and what 1 of its default and scale is there:
 /// `channel`, `flow`, `position` and `head` are filled in.
 ///
-/// `channel/flow^2` at a wheel is `V/(rad/s)^2`.
+/// `channel/flow^2` at a wheel is `V/(rad/s)^2`. Where a channel has no position, it is what the flow goes through in time.
 pub fn unit_at(unit: &str, channel: &Channel, plant: &'static PlantMeta) -> (String, f64) {
-    let signal = |role| {
+    let read = |role| {
         let index = channel.read(role).and_then(|id| signal_index(plant, id));
-        index
-            .and_then(|i| signals(plant).nth(i))
-            .map_or(("1", 1.0), |s| (s.unit, s.size))
+        index.and_then(|i| signals(plant).nth(i))
+    };
+    let none = || ("1".to_owned(), 1.0);
+    let signal = |role| read(role).map_or_else(none, |s| (s.unit.to_owned(), s.size));
+    let position = || match (read(Role::Position), read(Role::Flow)) {
+        (None, Some(flow)) => {
+            let way = flow.unit.strip_suffix("/s").map(str::to_owned);
+            (way.unwrap_or_else(|| format!("{} s", flow.unit)), flow.size)
+        }
+        _ => signal(Role::Position),
     };
     let mut filled = unit.to_owned();
     let mut total = 1.0;
     for (word, (unit_here, size)) in [
-        ("channel", (channel.unit, channel.size)),
+        ("channel", (channel.unit.to_owned(), channel.size)),
         ("flow", signal(Role::Flow)),
-        ("position", signal(Role::Position)),
+        ("position", position()),
         ("head", signal(Role::Head)),
     ] {
         let Some((before, after)) = unit.split_once(word) else {
@@ -178,7 +187,7 @@ pub fn unit_at(unit: &str, channel: &Channel, plant: &'static PlantMeta) -> (Str
         total *= size.powi(if divides { -power } else { power });
         let alone = !unit_here.contains(['/', ' ']) || (before.is_empty() && power == 1);
         filled = if alone {
-            filled.replace(word, unit_here)
+            filled.replace(word, &unit_here)
         } else {
             filled.replace(word, &format!("({unit_here})"))
         };

@@ -157,6 +157,26 @@ fn a_joint_with_hysteresis_is_found_with_its_loop() {
     finds(Hidden::Hysteresis, 0.5, 3);
 }
 
+/// Found with its level and its way, where creeping shows it with what breaking away takes as well, and once.
+#[test]
+fn a_seal_that_bends_before_it_slides_is_found_in_the_form_that_shows() {
+    let recording = log(&[(Hidden::LugreFriction, 1.0)], Experiment::Mixed, 1);
+    let diagnosis = judge(&recording, None);
+    let best = &diagnosis.candidates[0];
+    assert_eq!(best.place.effect, "lugre_friction");
+    for (id, truth) in [
+        ("level", 0.8),
+        ("excess", 0.5),
+        ("speed", 1.0),
+        ("way", 0.1),
+    ] {
+        let found = best.parameters[id].value;
+        assert!((found - truth).abs() < 0.03 * truth, "{id}: {found}");
+    }
+    let rows = diagnosis.candidates.iter();
+    assert_eq!(rows.filter(|c| c.place == best.place).count(), 1);
+}
+
 /// Found with the share of the inertia that is behind the spring, and how it swings.
 #[test]
 fn a_load_behind_a_spring_is_found() {

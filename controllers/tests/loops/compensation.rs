@@ -254,9 +254,9 @@ fn every_effect_of_the_library_can_stand_in_a_loop() {
         | "sensor_scale"
         | "wheel_radius_mismatch" => Some("predicted over"),
         "backlash" | "bridge_coast" | "elastic_coupling" | "end_stop" | "friction_drift"
-        | "gain_drift" | "hysteresis" | "input_lead" | "wheel_slip" | "payload_change"
-        | "torque_ripple" | "gravity_slope" | "gravity_pendulum" | "linear_stiffness"
-        | "cubic_stiffness" | "encoder_ripple" => Some("not compensated"),
+        | "gain_drift" | "hysteresis" | "lugre_friction" | "input_lead" | "wheel_slip"
+        | "payload_change" | "torque_ripple" | "gravity_slope" | "gravity_pendulum"
+        | "linear_stiffness" | "cubic_stiffness" | "encoder_ripple" => Some("not compensated"),
         "coulomb_friction"
         | "stribeck_friction"
         | "directional_friction"

@@ -1,6 +1,7 @@
 //! Effects at the shafts. Sizes are given in volts of equivalent motor voltage: of the 9 V that
 //! drive the machine, 0.9 V is 10 %.
 
+use crate::bristles::Bristles;
 use crate::contact::{Gap, Stops};
 use crate::hysteresis::Hysteresis;
 use crate::physics::{Cogging, Physics};
@@ -184,6 +185,25 @@ pub(super) fn hysteresis(m: &mut Physics, of: Concealed) -> Concealed {
         .fitted("onward", onward, "1/rad")
         .fitted("back", back, "1/rad")
         .physical("torque_per_angle", torque, "N m/rad")
+}
+
+/// A seal whose lips bend by 0.1 rad before they slide: at 0.8 V, and at 1.2 V when they break away.
+pub(super) fn bristles(m: &mut Physics, of: Concealed) -> Concealed {
+    let (level, excess, speed, way) = (0.8 * of.size, 0.5, 1.0, 0.1);
+    let sliding = level * m.motor.torque_per_volt();
+    m.seal = Bristles {
+        stiffness: sliding / way,
+        sliding,
+        breakaway: excess * sliding,
+        stribeck_speed: speed,
+        torque: 0.0,
+    };
+    of.fitted("level", level, "V")
+        .fitted("excess", excess, "1")
+        .fitted("speed", speed, "rad/s")
+        .fitted("way", way, "rad")
+        .physical("sliding_torque", sliding, "N m")
+        .physical("torque_per_angle", sliding / way, "N m/rad")
 }
 
 /// Stops 1.5 rad below and 2 rad above the start that give 0.15 rad to the 9 V of the motor.

@@ -47,6 +47,7 @@ pub(crate) fn hide(
         H::LinearStiffness => effort::spring(machine, concealed),
         H::CubicStiffness => effort::hardening(machine, concealed),
         H::Hysteresis => effort::hysteresis(machine, concealed),
+        H::LugreFriction => effort::bristles(machine, concealed),
         H::EndStop => effort::stops(machine, concealed),
         H::Overflow => return Err(not_here),
         H::ScrubFriction => body::scrub(machine, concealed),
@@ -116,6 +117,7 @@ fn fits(effect: Hidden, robot: Driven) -> bool {
         | H::LinearStiffness
         | H::CubicStiffness
         | H::Hysteresis
+        | H::LugreFriction
         | H::EndStop
         | H::ElasticCoupling
         | H::SensorMagnitude => robot == Driven::Axis,

@@ -1,0 +1,47 @@
+//! Whether a fitted effect is there at all, and is itself.
+
+use crate::candidates::Candidate;
+use crate::conclusion::Explanation;
+use crate::estimate::ParameterVerdict;
+
+/// Whether an effect has any size: a parameter whose neutral value is zero is above the share `least` of its
+/// noticeable size, a time above `shift` (s). Where it has none, any parameter must be as far from its neutral value.
+pub(crate) fn does_something(explanation: &Explanation, least: f64, shift: f64) -> bool {
+    let model = &explanation.model;
+    let place = &explanation.place;
+    let own = model.effects.iter().filter(|effect| {
+        effect.meta.id == place.effect
+            && effect
+                .at
+                .iter()
+                .all(|c| place.at.iter().any(|at| at == c.id))
+    });
+    let free: Vec<_> = own
+        .flat_map(|effect| {
+            let parameters = model.parameters.iter().skip(effect.first_parameter);
+            parameters.take(effect.meta.parameters.len())
+        })
+        .filter(|p| p.free)
+        .collect();
+    let has_size = free.iter().any(|p| p.declaration.default == Some(0.0));
+    free.iter()
+        .filter(|p| !has_size || p.declaration.default == Some(0.0))
+        .any(|p| {
+            let away = p.value.zip(p.declaration.default);
+            let shift = if p.unit == "s" { shift } else { 0.0 };
+            let enough = shift.max(least * p.scale());
+            away.is_none_or(|(value, neutral)| (value - neutral).abs() > enough)
+        })
+}
+
+/// Whether the log does not determine what makes an effect more than a simpler one.
+pub(crate) fn is_a_simpler_one(candidate: &Candidate, explanation: &Explanation) -> bool {
+    let vanishing = |i: &usize| {
+        let parameter = &candidate.model.parameters[*i];
+        parameter.free && parameter.declaration.vanishing
+    };
+    candidate.own().filter(vanishing).any(|i| {
+        let estimate = explanation.parameters.get(&candidate.name(i));
+        estimate.is_some_and(|e| e.verdict != ParameterVerdict::Good)
+    })
+}
