@@ -12,9 +12,7 @@ use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
 use crate::pairs::{names_a_stand_in, pair};
 use crate::progress::{Cancelled, Work};
-use crate::refine::{
-    blurs, estimated, is_undetermined, refine, still_open, take_values, without_step,
-};
+use crate::refine::{blurs, estimated, is_undetermined, refine, still_open, without_step};
 use crate::settings::{FitSettings, ImproveSettings, Method};
 use loopsight_model::model::Model;
 
@@ -142,8 +140,8 @@ struct State {
     present: Model,
     /// When an expression is a candidate.
     discover: Discover,
-    /// What it was before the last step: the fit without that step begins there.
-    before: Option<Model>,
+    /// What it was before the last step, and its steps then. What that step changed in earlier ones goes with it.
+    before: Option<(Model, Vec<ImprovementStep>)>,
     steps: Vec<ImprovementStep>,
     diagnoses: Vec<Diagnosis>,
 }
@@ -198,6 +196,7 @@ impl State {
     /// Adds what the diagnosis of a `round` named.
     fn step(&mut self, best: Explanation, round: usize, work: &Work<'_>) {
         work.in_round(round).know(|| Finding::Added((&best).into()));
+        let steps = self.steps.clone();
         self.steps.push(ImprovementStep {
             added: Some(best.place),
             entries: best.entries,
@@ -206,7 +205,7 @@ impl State {
             nrmse_test: best.nrmse,
             still_open: Vec::new(),
         });
-        self.before = Some(std::mem::replace(&mut self.present, best.model));
+        self.before = Some((std::mem::replace(&mut self.present, best.model), steps));
     }
 
     /// Adds what the diagnosis of a `round` named, and corrects earlier steps where that changes them. Whether it stays.
@@ -279,15 +278,14 @@ impl State {
             if present.cancelled || !idle && !may_blur {
                 return Ok(present);
             }
-            let Some(without) = self.without_last(&present.model) else {
+            let Some((without, steps)) = self.without_last(&present.model) else {
                 return Ok(present);
             };
             let alone = fit(&without, measurements, settings, work)?;
             if !idle && !blurs(&alone, &present, missing.undetermined, improve.blurs) {
                 return Ok(present);
             }
-            self.present = without;
-            self.steps.pop();
+            (self.present, self.steps) = (without, steps);
             present = alone;
         }
     }
@@ -295,20 +293,18 @@ impl State {
     /// Takes the last step back. Whether there was one.
     fn take_back(&mut self) -> bool {
         let without = self.without_last(&self.present.clone());
-        without.is_some_and(|without| {
-            self.present = without;
-            self.steps.pop().is_some()
+        without.is_some_and(|(without, steps)| {
+            (self.present, self.steps) = (without, steps);
+            true
         })
     }
 
-    /// A `model` without the effect of the last step, with the values from before it where they are known; none where
-    /// there is no such step.
-    fn without_last(&mut self, model: &Model) -> Option<Model> {
-        let mut without = without_step(model, self.steps.last()?)?;
-        if let Some(before) = self.before.take() {
-            take_values(&mut without, &before);
-        }
-        Some(without)
+    /// What there was before the last step; of earlier ones a `model` without its effect is made. None where there is no
+    /// such step.
+    fn without_last(&mut self, model: &Model) -> Option<(Model, Vec<ImprovementStep>)> {
+        let (last, earlier) = self.steps.split_last()?;
+        let without = without_step(model, last)?;
+        Some((self.before.take()).unwrap_or_else(|| (without, earlier.to_vec())))
     }
 
     /// The verdict on the steps that remain: that nothing is missing was said with all of them.
@@ -395,10 +391,25 @@ mod tests {
         let mut state = State::new(&of(8.0), Discover::Never);
         state.steps = vec![step(None), step(Some("coulomb_friction"))];
         let with = of(1e9).with_effect("coulomb_friction", &["shaft"]).unwrap();
-        state.before = Some(std::mem::replace(&mut state.present, with));
+        let before = std::mem::replace(&mut state.present, with);
+        state.before = Some((before, vec![step(None)]));
         assert!(state.take_back());
         assert_eq!((state.steps.len(), state.present.effects.len()), (1, 0));
         assert_eq!(state.present.values(), of(8.0).values());
         assert!(!state.take_back(), "the model as it is is no step");
+
+        // What it had changed in an earlier step is as before.
+        let earlier = of(8.0).with_effect("directional_friction", &["shaft"]);
+        state.before = earlier.map(|m| (m, vec![step(None), step(Some("directional_friction"))]));
+        let both = of(8.0).with_effect("coulomb_friction", &["shaft"]);
+        state.present = both.unwrap().with_effect("end_stop", &["shaft"]).unwrap();
+        let names = [None, Some("coulomb_friction"), Some("end_stop")];
+        state.steps = names.map(step).to_vec();
+        assert!(state.take_back());
+        assert_eq!(
+            state.steps[1].added,
+            step(Some("directional_friction")).added
+        );
+        assert_eq!(state.present.effects[0].meta.id, "directional_friction");
     }
 }
