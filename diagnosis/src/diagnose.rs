@@ -366,6 +366,11 @@ fn search(
         all: &all,
         nominal,
         work,
+        floor: floor(
+            nominal.given,
+            &nominal.holdout.fitting(),
+            &work.criteria().log,
+        ),
         shift: stamps::shift(nominal.holdout.runs),
     };
     let Found { finalists, looked } = search.run();

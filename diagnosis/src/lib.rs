@@ -137,6 +137,7 @@ mod starts;
 mod stride;
 mod substance;
 mod sufficiency;
+mod suited;
 #[cfg(test)]
 mod swing;
 pub mod tracking;

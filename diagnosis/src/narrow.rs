@@ -4,7 +4,6 @@ use loopsight_model::model::{Model, Origin};
 use loopsight_model::run::Run;
 
 use crate::arrive::Starts;
-use crate::candidates::widths;
 use crate::error::FitError;
 use crate::output_error::prepare;
 use crate::prediction::signal_rms;
@@ -12,6 +11,7 @@ use crate::problem::Problem;
 use crate::progress::Work;
 use crate::settings::FitSettings;
 use crate::solve::Effort;
+use crate::suited::widths;
 
 /// How often a width may be the one that suits a recording. A mass on a spring with dry friction has its level within 0.3 %
 /// there, within 3 % at four times the width, and 62 % too high at forty times.

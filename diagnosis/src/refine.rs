@@ -3,7 +3,6 @@
 use loopsight_model::model::{Attached, Model, ModelParameter};
 use rayon::prelude::*;
 
-use crate::candidates::smooth;
 use crate::compare::compare;
 use crate::conclusion::Diagnosis;
 use crate::effect_at::EffectAt;
@@ -16,6 +15,7 @@ use crate::output_error::fitted_values;
 use crate::progress::{Stage, Work};
 use crate::solve::Effort;
 use crate::split::split;
+use crate::suited::smooth;
 
 /// Corrects `model` after the last of `steps`:
 ///
@@ -138,14 +138,6 @@ pub(crate) fn blurs(alone: &Fit, with: &Fit, undetermined: f64, times: f64) -> b
 pub(crate) fn without_step(model: &Model, step: &ImprovementStep) -> Option<Model> {
     let instances = instances(model, step.added.as_ref()?);
     (!instances.is_empty()).then(|| without(model, &instances))?
-}
-
-/// Gives the parameters of `model` the values that those of the same name have in `other`.
-pub(crate) fn take_values(model: &mut Model, other: &Model) {
-    for parameter in &mut model.parameters {
-        let same = other.parameters.iter().find(|p| p.name == parameter.name);
-        parameter.value = same.and_then(|p| p.value).or(parameter.value);
-    }
 }
 
 /// The model without some of its effects.

@@ -29,6 +29,8 @@ pub(crate) struct Search<'a> {
     pub(crate) all: &'a [Candidate],
     pub(crate) nominal: &'a Nominal<'a>,
     pub(crate) work: &'a Work<'a>,
+    /// What noise and resolution alone leave of the fitting data.
+    pub(crate) floor: f64,
     /// How late time stamps may be of their own, s.
     pub(crate) shift: f64,
 }
@@ -358,7 +360,7 @@ impl Search<'_> {
     }
 
     /// Attempts at candidates that were not tried yet, starting from where simpler ones ended. They are taken
-    /// out of `waiting`.
+    /// out of `waiting`. What ended at the floor has left nothing for a larger one.
     fn grown(
         &self,
         looked: &[(usize, Judged)],
@@ -382,14 +384,18 @@ impl Search<'_> {
             });
             let elsewhere = error > criteria.elsewhere * least(places);
             let divided = error < criteria.worth_dividing * nrmse(self.nominal.rank);
+            let of = simpler.candidate.complexity();
+            let allowance = (self.work.criteria().choice).allowance(candidate.complexity(), of);
+            // A fuller form comes where it is better at all.
+            let nothing_left = !candidate.further && error <= allowance * self.floor;
             let starts = starts_from(candidate, simpler, extent);
             let worth = error < criteria.worth_growing * least_of_all
                 && (!candidate.separate || divided)
                 && starts.len() <= criteria.grown_starts;
-            if elsewhere || worth {
+            if elsewhere || worth || nothing_left {
                 waiting.retain(|(j, _)| i != *j);
             }
-            if worth && !elsewhere {
+            if worth && !elsewhere && !nothing_left {
                 attempts.extend(starts.into_iter().map(|start| (i, start)));
             }
         }

@@ -6,11 +6,11 @@ use loopsight_model::model::{Model, misfit};
 use loopsight_model::registry::{self, BuildError};
 
 use crate::EffectAt;
-use crate::candidates::{last_rms, suit};
 use crate::criteria::Criteria;
 use crate::experiment::ExperimentLimits;
 use crate::places::channel_sets;
 use crate::progress::Cancelled;
+use crate::suited::{last_rms, suit};
 
 /// Why a question cannot be answered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -73,7 +73,7 @@ impl Effect for LugreFriction {
                 "excess",
                 "e",
                 "1",
-                "what breakaway takes beyond the friction in motion, of it; where the file gives it",
+                "what breakaway takes beyond the friction in motion, as a share of it; a fit needs a first value of it",
             )
             .within(0.0, 20.0)
             .or(0.0)
@@ -84,7 +84,7 @@ impl Effect for LugreFriction {
                 "speed",
                 "v_s",
                 "flow",
-                "speed at which the excess has fallen to 1/e; where the file gives it",
+                "speed at which the excess has fallen to 1/e; a fit needs a first value of it",
             )
             .above(0.0)
             .or(1.0)
@@ -107,11 +107,12 @@ impl Effect for LugreFriction {
             .within(0.0, f64::INFINITY)
             .or(0.0)
             .nonlinear()
+            .scaled(1e-3)
             .known(),
         ],
         states: 1,
         rarity: 2,
-        max_step_s: 0.002,
+        max_step_s: 0.0025,
         ..EffectMeta::PLAIN
     };
 
