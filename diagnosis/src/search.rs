@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use loopsight_model::run::Run;
 use rayon::prelude::*;
 
 use crate::both_ways::is_the_same_both_ways;
@@ -165,7 +166,9 @@ impl Search<'_> {
         let criteria = self.work.criteria();
         let stands_in = is_the_same_both_ways(&judged.candidate, &explanation, criteria);
         let acts = does_something(&explanation, criteria.search.does_nothing, self.shift);
-        let simpler = is_a_simpler_one(&judged.candidate, &explanation);
+        let periods = self.nominal.holdout.runs.iter().map(Run::median_period);
+        let period = periods.fold(f64::INFINITY, f64::min);
+        let simpler = is_a_simpler_one(&judged.candidate, &explanation, period);
         (acts && !stands_in && !simpler).then_some((judged, explanation))
     }
 

@@ -34,14 +34,29 @@ pub(crate) fn does_something(explanation: &Explanation, least: f64, shift: f64) 
         })
 }
 
-/// Whether the log does not determine what makes an effect more than a simpler one.
-pub(crate) fn is_a_simpler_one(candidate: &Candidate, explanation: &Explanation) -> bool {
+/// Share of a sample in which a way is gone through at the usual speed, below which no log shows it: a signal that changes
+/// within a hundredth of a sample is told from a step by a hundredth of what the step adds to one sample.
+const SHORTEST: f64 = 0.01;
+
+/// Whether a log with this `period` (s) does not show what makes an effect more than a simpler one: it does not determine it,
+/// or it is a way too short to be seen.
+pub(crate) fn is_a_simpler_one(
+    candidate: &Candidate,
+    explanation: &Explanation,
+    period: f64,
+) -> bool {
     let vanishing = |i: &usize| {
         let parameter = &candidate.model.parameters[*i];
         parameter.free && parameter.declaration.vanishing
     };
     candidate.own().filter(vanishing).any(|i| {
+        let is_way = candidate.model.parameters[i].declaration.unit == "position";
+        let least = if is_way {
+            SHORTEST * period * candidate.flow
+        } else {
+            0.0
+        };
         let estimate = explanation.parameters.get(&candidate.name(i));
-        estimate.is_some_and(|e| e.verdict != ParameterVerdict::Good)
+        estimate.is_some_and(|e| e.verdict != ParameterVerdict::Good || e.value.abs() < least)
     })
 }

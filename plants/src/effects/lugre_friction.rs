@@ -97,7 +97,7 @@ impl Effect for LugreFriction {
                 .nonlinear()
                 .scaled(0.01)
                 .vanishing()
-                .starting_at(&[0.005, 0.02, 0.1]),
+                .starting_at(&[0.03]),
             Parameter::new(
                 "damping",
                 "τ_b",
