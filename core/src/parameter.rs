@@ -226,6 +226,11 @@ impl Parameter {
         self
     }
 
+    /// Whether a model file that does not give it is without it: a limit, or a part of a fuller form.
+    pub fn is_there_where_given(&self) -> bool {
+        self.limits.is_some() || self.further
+    }
+
     /// Whether it is a speed over which the sign of a force is smoothed.
     pub fn is_width(&self) -> bool {
         self.unit == "flow" && !self.estimated

@@ -88,8 +88,8 @@ impl Candidate {
         self.own()
             .filter(|i| {
                 let parameter = &self.model.parameters[*i];
-                let declaration = parameter.declaration;
-                parameter.free || !declaration.starts.is_empty() && !declaration.further
+                let listed = !parameter.declaration.starts.is_empty();
+                parameter.free || listed && !parameter.is_left_out()
             })
             .count()
     }

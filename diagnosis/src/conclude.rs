@@ -20,9 +20,8 @@ pub(crate) struct Evidence<'a> {
     pub(crate) unseen: &'a Losses,
     /// Its error on what it was fitted to.
     pub(crate) nominal_fit: f64,
-    /// The error that noise alone would leave on the validation data, and on the fitted data.
+    /// The error that noise alone would leave on the validation data; [`Nominal::floor`] is that on the fitted data.
     pub(crate) floor: f64,
-    pub(crate) floor_fit: f64,
     /// A quantity of the model predicts the residuals, on blocks that it was not chosen by.
     pub(crate) predictable: bool,
     /// Least share of the standard deviation that an explanation must account for.
@@ -139,7 +138,7 @@ impl Evidence<'_> {
             && self.above_floor(self.error())
             && nrmse(&judged.losses) <= criteria.no_worse * self.error()
             && explanation.significance > criteria.certain
-            && explained > (criteria.matters * self.floor_fit).max(self.least)
+            && explained > (criteria.matters * self.nominal.floor).max(self.least)
     }
 
     /// Whether the chosen explanation is what is missing: significantly better than no effect, better by enough
@@ -160,7 +159,7 @@ impl Evidence<'_> {
     /// An explanation that explains the log but not the test recording: the log shows that something is
     /// missing, but cannot tell what.
     fn explains_log_alone<'e>(&self, explanations: &'e [Explanation]) -> Option<&'e Explanation> {
-        let enough = self.missing().explained * self.floor_fit;
+        let enough = self.missing().explained * self.nominal.floor;
         explanations
             .iter()
             .find(|e| e.nrmse_fit < enough && self.above_floor(e.nrmse))
@@ -171,7 +170,7 @@ impl Evidence<'_> {
     fn blind(&self, explained: bool) -> bool {
         self.nominal.holdout.test.is_some()
             && self.above_floor(self.error())
-            && (self.nominal_fit < self.missing().explained * self.floor_fit || explained)
+            && (self.nominal_fit < self.missing().explained * self.nominal.floor || explained)
     }
 }
 

@@ -28,6 +28,7 @@ use crate::residual_force;
 use crate::search::{Found, Search};
 use crate::settings::FitSettings;
 use crate::stamps;
+use crate::starts::Extent;
 use crate::sufficiency;
 use crate::trial::{FINAL, Judged, Nominal};
 use crate::untried::untried;
@@ -178,6 +179,7 @@ fn steps(
         solution: &plain.solution,
         cost: plain.cost,
         rank: &plain.judgement.rank,
+        floor: floor(model, &holdout.fitting(), &criteria.log),
         held: (!moves).then_some(&plain.solution.states),
         holdout: &holdout,
         work: &silent,
@@ -203,6 +205,7 @@ fn steps(
         model: &plain.model,
         solution: &plain.solution,
         rank: &plain.judgement.rank,
+        floor: floor(model, &holdout.fitting(), &criteria.log),
         holdout: &holdout,
         ..nominal
     };
@@ -234,11 +237,6 @@ fn conclude_from(
         unseen,
         nominal_fit: diagnosis.nominal_fit,
         floor: diagnosis.floor.nrmse,
-        floor_fit: floor(
-            nominal.given,
-            &nominal.holdout.fitting(),
-            &work.criteria().log,
-        ),
         predictable: predictable(nominal.model, nominal.solution, runs, work)?,
         least: aim.least,
     };
@@ -366,11 +364,7 @@ fn search(
         all: &all,
         nominal,
         work,
-        floor: floor(
-            nominal.given,
-            &nominal.holdout.fitting(),
-            &work.criteria().log,
-        ),
+        extent: Extent::of(nominal.holdout.runs),
         shift: stamps::shift(nominal.holdout.runs),
     };
     let Found { finalists, looked } = search.run();

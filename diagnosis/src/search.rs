@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use loopsight_model::run::Run;
 use rayon::prelude::*;
 
 use crate::both_ways::is_the_same_both_ways;
@@ -30,8 +29,8 @@ pub(crate) struct Search<'a> {
     pub(crate) all: &'a [Candidate],
     pub(crate) nominal: &'a Nominal<'a>,
     pub(crate) work: &'a Work<'a>,
-    /// What noise and resolution alone leave of the fitting data.
-    pub(crate) floor: f64,
+    /// What the recording can show in time.
+    pub(crate) extent: Extent,
     /// How late time stamps may be of their own, s.
     pub(crate) shift: f64,
 }
@@ -166,9 +165,7 @@ impl Search<'_> {
         let criteria = self.work.criteria();
         let stands_in = is_the_same_both_ways(&judged.candidate, &explanation, criteria);
         let acts = does_something(&explanation, criteria.search.does_nothing, self.shift);
-        let periods = self.nominal.holdout.runs.iter().map(Run::median_period);
-        let period = periods.fold(f64::INFINITY, f64::min);
-        let simpler = is_a_simpler_one(&judged.candidate, &explanation, period);
+        let simpler = is_a_simpler_one(&judged.candidate, &explanation, self.extent.period);
         (acts && !stands_in && !simpler).then_some((judged, explanation))
     }
 
@@ -193,9 +190,8 @@ impl Search<'_> {
                 && candidate.replaces.is_none()
                 && !finalists.iter().any(|(other, _)| is_near(other))
         };
-        let extent = Extent::of(self.nominal.holdout.runs);
         let fitted = |candidate: &Candidate| {
-            let starts = starts_from(candidate, best, extent);
+            let starts = starts_from(candidate, best, self.extent);
             let looks = starts.iter().filter_map(|start| {
                 look(&candidate.chosen(start), start, self.nominal, f64::INFINITY)
             });
@@ -216,12 +212,11 @@ impl Search<'_> {
 
     /// All that were looked at, by their indices.
     fn looked_at(&self) -> Vec<(usize, Judged)> {
-        let extent = Extent::of(self.nominal.holdout.runs);
         let attempts: Vec<Attempt> = (self.all.iter().enumerate())
             .filter(|(_, c)| !c.separate && !c.further)
             .flat_map(|(i, c)| {
-                let starts = first_starts(c, self.nominal.model, extent);
-                let fresh = fresh_starts(c, self.nominal, extent);
+                let starts = first_starts(c, self.nominal.model, self.extent);
+                let fresh = fresh_starts(c, self.nominal, self.extent);
                 starts.into_iter().chain(fresh).map(move |start| (i, start))
             })
             .collect();
@@ -237,7 +232,7 @@ impl Search<'_> {
         // A candidate that contains another one comes after it, and starts from where that one ended. Where that
         // one failed, it starts from its own best start.
         while !self.work.is_cancelled() {
-            let mut next = self.grown(&looked.found, &tried, &mut waiting, extent);
+            let mut next = self.grown(&looked.found, &tried, &mut waiting);
             next.append(&mut waiting);
             if next.is_empty() {
                 break;
@@ -251,11 +246,10 @@ impl Search<'_> {
     /// All that were looked at from the values of the model as it was given, by their indices. A promise says nothing so far
     /// from the machine, so each candidate gets a short fit.
     fn looked_at_from_given(&self) -> Vec<(usize, Judged)> {
-        let extent = Extent::of(self.nominal.holdout.runs);
         let attempts: Vec<Attempt> = (self.all.iter().enumerate())
             .filter(|(_, c)| !c.separate && !c.further && c.replaces.is_none())
             .filter_map(|(i, c)| {
-                let starts = first_starts(c, self.nominal.given, extent);
+                let starts = first_starts(c, self.nominal.given, self.extent);
                 Some((i, starts.into_iter().next()?))
             })
             .collect();
@@ -369,7 +363,6 @@ impl Search<'_> {
         looked: &[(usize, Judged)],
         tried: &BTreeSet<usize>,
         waiting: &mut Vec<Attempt>,
-        extent: Extent,
     ) -> Vec<Attempt> {
         let criteria = self.criteria();
         let least_of_all = least(looked.iter().map(|(_, found)| found));
@@ -390,8 +383,8 @@ impl Search<'_> {
             let of = simpler.candidate.complexity();
             let allowance = (self.work.criteria().choice).allowance(candidate.complexity(), of);
             // A fuller form comes where it is better at all.
-            let nothing_left = !candidate.further && error <= allowance * self.floor;
-            let starts = starts_from(candidate, simpler, extent);
+            let nothing_left = !candidate.further && error <= allowance * self.nominal.floor;
+            let starts = starts_from(candidate, simpler, self.extent);
             let worth = error < criteria.worth_growing * least_of_all
                 && (!candidate.separate || divided)
                 && starts.len() <= criteria.grown_starts;

@@ -22,8 +22,8 @@ const FLOW_STARTS: [f64; 3] = [0.03, 0.1, 0.3];
 pub(crate) struct Extent {
     /// Of the longest run, s.
     duration: f64,
-    /// Half the rate of the samples as an angular frequency, rad/s: what swings faster shows as something slower.
-    fastest: f64,
+    /// The shortest time between samples, s.
+    pub(crate) period: f64,
 }
 
 impl Extent {
@@ -32,7 +32,7 @@ impl Extent {
         let periods = runs.iter().map(Run::median_period);
         Self {
             duration: longest,
-            fastest: std::f64::consts::PI / periods.fold(f64::INFINITY, f64::min),
+            period: periods.fold(f64::INFINITY, f64::min),
         }
     }
 
@@ -40,7 +40,9 @@ impl Extent {
     fn starts(self, parameter: &ModelParameter) -> Vec<f64> {
         let mut listed = parameter.starts(self.duration);
         if parameter.declaration.unit == "rad/s" {
-            listed.retain(|frequency| *frequency < self.fastest);
+            // What swings faster than half the rate of the samples shows as something slower.
+            let fastest = std::f64::consts::PI / self.period;
+            listed.retain(|frequency| *frequency < fastest);
         }
         listed
     }
@@ -128,18 +130,11 @@ fn measured_at(model: &Model, at: &[&str]) -> Vec<usize> {
 pub(crate) fn starts_from(candidate: &Candidate, other: &Judged, extent: Extent) -> Vec<Vec<f64>> {
     let own = other.candidate.own();
     let values = &other.solution.values;
-    let meant = |i: &usize| {
-        let parameter = &other.candidate.model.parameters[*i];
-        parameter.free || !parameter.declaration.further
-    };
-    let known = (own.clone().take(other.candidate.meta.parameters.len()))
-        .filter(meant)
-        .map(|i| {
-            (
-                other.candidate.model.parameters[i].declaration.id,
-                values[i],
-            )
-        })
+    let parameters = &other.candidate.model.parameters[own.clone()];
+    let known = (parameters.iter().zip(&values[own.clone()]))
+        .take(other.candidate.meta.parameters.len())
+        .filter(|(parameter, _)| !parameter.is_left_out())
+        .map(|(parameter, value)| (parameter.declaration.id, *value))
         .collect();
     starts(candidate, &values[..own.start], &known, extent)
 }
@@ -159,13 +154,12 @@ fn starts(
         let nearest = |value: f64| parameter.declaration.nearest(value);
         let neutral = parameter.value.unwrap_or(0.0);
         let listed = extent.starts(parameter);
-        let held = parameter.declaration.further && !parameter.free;
         if listed.is_empty() && !parameter.declaration.starts.is_empty() {
             return Vec::new();
         }
         let limits = parameter.declaration.limits.filter(|_| parameter.free);
         let at_end = limits.and_then(|end| candidate.ends[end as usize]);
-        let values: Vec<f64> = if held {
+        let values: Vec<f64> = if parameter.is_left_out() {
             vec![neutral]
         } else if let Some(value) = known.get(parameter.declaration.id) {
             vec![*value]

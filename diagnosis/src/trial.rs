@@ -94,6 +94,8 @@ pub(crate) struct Nominal<'a> {
     pub(crate) cost: f64,
     /// What candidates are ranked by.
     pub(crate) rank: &'a Losses,
+    /// What noise and resolution alone leave of the fitting data.
+    pub(crate) floor: f64,
     /// Its initial states, where a short fit holds them.
     pub(crate) held: Option<&'a [DVector<f64>]>,
     pub(crate) holdout: &'a Holdout<'a>,

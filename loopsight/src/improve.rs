@@ -137,7 +137,7 @@ fn improved_text(
             .zip(effect.meta.parameters)
             // A limit that was not found is not there, nor is a fuller form.
             .filter(|(parameter, declaration)| {
-                parameter.free || declaration.limits.is_none() && !declaration.further
+                parameter.free || !declaration.is_there_where_given()
             })
             .filter_map(|(parameter, declaration)| Some((declaration.id, parameter.value?)))
             .collect();

@@ -23,9 +23,7 @@ pub(crate) fn attach(
     // A limit that the file does not give is not there, and a fuller form is one that the file gives.
     let own = &mut parameters[attached.first_parameter..];
     for (parameter, given) in own.iter_mut().zip(given) {
-        let declaration = parameter.declaration;
-        parameter.free &= declaration.limits.is_none() || given.is_some();
-        parameter.free |= declaration.further && declaration.estimated && given.is_some();
+        parameter.free &= given.is_some() || !parameter.declaration.is_there_where_given();
     }
     Ok(attached)
 }
@@ -127,7 +125,7 @@ pub(crate) fn bind(
             unit,
             value: given.or(declaration.default.map(|d| d * size)),
             origin: Origin::of(*given),
-            free: declaration.estimated && acts && !declaration.further,
+            free: declaration.estimated && acts,
             per_run: false,
             size,
             path: base.iter().cloned().chain(path).collect(),

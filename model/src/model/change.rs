@@ -18,7 +18,7 @@ struct Entries {
 
 impl Model {
     /// The model with the effect `id` added at the channels `at`: one of the library with its default
-    /// parameters, or a [candidate](Self::candidates) of the file with those that it gives. `None` when there is no such
+    /// parameters and in its usual form, or a [candidate](Self::candidates) of the file with those that it gives. `None` when there is no such
     /// effect or it does not fit one of the channels.
     pub fn with_effect(&self, id: &str, at: &[&str]) -> Option<Model> {
         let own = self.candidates.iter().find(|c| c.is(id, at));
@@ -40,6 +40,9 @@ impl Model {
         let mut model = self.clone();
         let base: [PathSegment; 3] = ["effect".into(), model.effects.len().into(), part.into()];
         let attached = bind(self.plant, ready, channels, &base, &mut model.parameters);
+        for parameter in &mut model.parameters[attached.first_parameter..] {
+            parameter.free &= !parameter.declaration.further;
+        }
         model.effects.push(attached);
         make_names_unique(&mut model.parameters, &model.effects);
         model.hold_unshown();

@@ -52,6 +52,11 @@ impl ModelParameter {
         self.declaration.scale * self.size
     }
 
+    /// Whether it belongs to a fuller form of its effect than this model has: it keeps its default.
+    pub fn is_left_out(&self) -> bool {
+        self.declaration.further && !self.free
+    }
+
     /// Values from which a fit to a recording of `duration` s should start; empty where one start
     /// will do.
     pub fn starts(&self, duration: f64) -> Vec<f64> {
