@@ -12,7 +12,9 @@ use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
 use crate::pairs::{names_a_stand_in, pair};
 use crate::progress::{Cancelled, Work};
-use crate::refine::{blurs, estimated, is_undetermined, refine, still_open, without_step};
+use crate::refine::{
+    blurs, estimated, is_mostly_open, is_undetermined, refine, still_open, without_step,
+};
 use crate::settings::{FitSettings, ImproveSettings, Method};
 use loopsight_model::model::Model;
 
@@ -245,8 +247,8 @@ impl State {
     ///
     /// * while the log does not say how strong its effect is and the unseen error hardly fell with it: there is some
     ///   effect for every imperfection, and it would take their values from the parameters that the log does determine;
-    /// * while a parameter of it is at an end of where it is searched, and it explains no large part: it stands in for
-    ///   another effect;
+    /// * while the log leaves open most of its parameters, or one of them is at an end of where it is searched, and it explains
+    ///   no large part: it stands in for another effect;
     /// * while something is missing with it, too, and it blurs what the log said of an earlier effect.
     fn settled(
         &mut self,
@@ -272,8 +274,10 @@ impl State {
             let hardly = fell_to >= improve.better;
             let incomplete = last.nrmse_test > missing.above_floor * floor;
             let tradeable = fell_to >= improve.worth_blurring;
+            let of_last = || estimated(&present, last).into_iter().map(|(_, e)| e);
             let idle = hardly && is_undetermined(&present, last, missing.undetermined)
-                || tradeable && stands_in(estimated(&present, last).into_iter().map(|(_, e)| e));
+                || tradeable && is_mostly_open(&present, last)
+                || tradeable && stands_in(of_last());
             let may_blur = incomplete && tradeable;
             if present.cancelled || !idle && !may_blur {
                 return Ok(present);

@@ -7,7 +7,7 @@ use crate::compare::compare;
 use crate::conclusion::Diagnosis;
 use crate::effect_at::EffectAt;
 use crate::error::FitError;
-use crate::estimate::{Estimate, strength_is_determined};
+use crate::estimate::{Estimate, ParameterVerdict, strength_is_determined};
 use crate::fitted::Fit;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
@@ -90,6 +90,17 @@ fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<
 /// Whether the log does not say how strong the effect of `step` is.
 pub(crate) fn is_undetermined(fit: &Fit, step: &ImprovementStep, undetermined: f64) -> bool {
     !strength_is_determined(estimated(fit, step).into_iter(), undetermined)
+}
+
+/// Whether the log leaves open most of what is fitted of the effect of `step`: then it is a shape that suits the rest of the
+/// error, and not what is behind it.
+pub(crate) fn is_mostly_open(fit: &Fit, step: &ImprovementStep) -> bool {
+    let own = estimated(fit, step);
+    let fitted = own.iter().filter(|(parameter, _)| parameter.free);
+    let open = fitted
+        .clone()
+        .filter(|(_, e)| e.verdict != ParameterVerdict::Good);
+    2 * open.count() > fitted.count()
 }
 
 /// The parameters of the effect of `step`, with their estimates.

@@ -6,6 +6,7 @@ use super::advice;
 use super::comparison::where_it_fails;
 use super::faults::faults;
 use super::force;
+use super::moved::moved;
 use super::number::{error, hundredths, number};
 use super::place::{enumerated, place, place_in_brackets, place_in_table, what_it_is};
 use super::table::table;
@@ -88,12 +89,11 @@ fn effect_missing(diagnosis: &Diagnosis) -> (String, Vec<String>) {
         because.push("Neither explains the error alone.".to_owned());
     }
     if let Some(best) = found(diagnosis) {
+        let with = if second.is_some() { "both" } else { "it" };
+        let fit = [diagnosis.nominal_fit, best.nrmse_fit];
         because.push(format!(
-            "With {} the free-run error falls from {} to {}, on data that the model was not fitted to. \
-             Noise and resolution alone would leave {}.",
-            if second.is_some() { "both" } else { "it" },
-            error(diagnosis.nominal.nrmse),
-            error(best.nrmse),
+            "{} Noise and resolution alone would leave {}.",
+            moved(with, fit, [diagnosis.nominal.nrmse, best.nrmse]),
             error(diagnosis.floor.nrmse)
         ));
     }

@@ -6,6 +6,7 @@ use loopsight_model::model::Attached;
 
 use super::diagnosis::{self, Said};
 use super::faults::faults;
+use super::moved::moved;
 use super::number::{error, hundredths};
 use super::place::{enumerated, place, place_in_brackets, place_in_table};
 use super::table::table;
@@ -49,7 +50,9 @@ pub fn said(improvement: &Improvement) -> Said {
             .collect(),
     };
     let with = if names.len() == 1 { "it" } else { "them" };
-    let mut because = vec![moved(with, first, end)];
+    let fit = [first, end].map(|step| step.nrmse_fit);
+    let unseen = [first, end].map(|step| step.nrmse_test);
+    let mut because = vec![moved(with, fit, unseen)];
     because.extend(
         improvement
             .steps
@@ -96,27 +99,6 @@ fn written(improvement: &Improvement, step: &ImprovementStep) -> Vec<String> {
             text + "."
         })
         .collect()
-}
-
-/// How the error moved with what was added. An effect that acts where the runs start need not lower the error elsewhere.
-fn moved(with: &str, first: &ImprovementStep, end: &ImprovementStep) -> String {
-    let [before, after] = [first, end].map(|step| error(step.nrmse_test));
-    if end.nrmse_test < first.nrmse_test && before != after {
-        return format!(
-            "With {with} the free-run error falls from {before} to {after}, on data that the model was not fitted to."
-        );
-    }
-    let unseen = if before == after {
-        format!("stays at {after}")
-    } else {
-        format!("goes from {before} to {after}")
-    };
-    format!(
-        "With {with} the free-run error on the fitted data falls from {} to {}; on data that the model was not fitted to it \
-         {unseen}.",
-        error(first.nrmse_fit),
-        error(end.nrmse_fit)
-    )
 }
 
 /// What is still missing at the end, where the error is `left` and noise would leave the `floor`.
@@ -248,32 +230,6 @@ pub fn text(improvement: &Improvement) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn step(nrmse_fit: f64, nrmse_test: f64) -> ImprovementStep {
-        ImprovementStep {
-            added: None,
-            entries: None,
-            round: Some(0),
-            nrmse_fit,
-            nrmse_test,
-            still_open: Vec::new(),
-        }
-    }
-
-    /// An error that does not fall is not said to.
-    #[test]
-    fn the_error_is_said_to_go_where_it_goes() {
-        let said = |fit: [f64; 2], test: [f64; 2]| {
-            moved("it", &step(fit[0], test[0]), &step(fit[1], test[1]))
-        };
-        let fell = said([0.2, 0.02], [0.3, 0.03]);
-        assert!(fell.contains("falls from 30.0 % to 3.00 %"), "{fell}");
-        let rose = said([0.0233, 0.0089], [0.00703, 0.00708]);
-        assert!(rose.contains("falls from 2.33 % to 0.89 %"), "{rose}");
-        assert!(rose.contains("goes from 0.70 % to 0.71 %"), "{rose}");
-        let stayed = said([0.0233, 0.0089], [0.00703, 0.00702]);
-        assert!(stayed.contains("stays at 0.70 %"), "{stayed}");
-    }
 
     /// What is below the floor is not said to be above it.
     #[test]

@@ -59,6 +59,7 @@ pub mod fit;
 mod force;
 pub mod improvement;
 pub mod inventory;
+mod moved;
 mod number;
 mod place;
 pub mod plan;
