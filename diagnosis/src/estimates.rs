@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use loopsight_model::model::ModelParameter;
+use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -13,6 +14,9 @@ use crate::fitted::Fit;
 use crate::flatness::Flatness;
 use crate::problem::Problem;
 use crate::settings::Method;
+
+/// Unit of parameters that are times.
+const TIME: &str = "s";
 
 /// A parameter by its index, with the unknowns that it is made of, and how much 1 of each is of it.
 type Shares = (usize, Vec<(usize, f64)>);
@@ -93,6 +97,14 @@ impl Problem<'_> {
         })
     }
 
+    /// Variance of a parameter that is a time, at the least, s²: windings and filters that the model leaves out take some, too,
+    /// and nothing in a log tells theirs from that of a delay.
+    fn least_variance_of_times(&self) -> f64 {
+        let periods = self.runs.iter().map(Run::median_period);
+        let period = periods.fold(f64::INFINITY, f64::min);
+        (self.work.criteria().parameters.clock * period).powi(2)
+    }
+
     /// What is known of the parameters at unknowns whose scaled `covariance` is this.
     fn known(&self, estimated: &[Shares], covariance: &DMatrix<f64>, flatness: &Flatness) -> Known {
         let of = |i: usize, j: usize| -> f64 {
@@ -103,11 +115,19 @@ impl Problem<'_> {
                 .sum()
         };
         let n = estimated.len();
+        let mut own = DMatrix::from_fn(n, n, of);
+        let least = self.least_variance_of_times();
+        for (k, (index, _)) in estimated.iter().enumerate() {
+            if self.model.parameters[*index].unit == TIME {
+                let variance = &mut own[(k, k)];
+                *variance = variance.max(least);
+            }
+        }
         let open =
             |(_, shares): &Shares| shares.iter().any(|(c, _)| flatness.is_open(*c).is_some());
         Known {
             free: estimated.iter().map(|(index, _)| *index).collect(),
-            covariance: DMatrix::from_fn(n, n, of),
+            covariance: own,
             undetermined: estimated.iter().map(open).collect(),
             quantile: self.quantile(covariance.ncols()),
             not_pinned: self.work.criteria().parameters.not_pinned,

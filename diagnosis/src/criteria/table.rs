@@ -63,7 +63,7 @@ criteria! {
         part_of_flat: f64 = 0.1 "1", Judgement: "smaller shares come from rounding and noise";
         /// Distance from the end of its range at which a parameter counts as being there, in its scale.
         at_bound: f64 = 1e-4 "1", Judgement: "far below any standard error";
-        /// Standard deviation of a shift of the whole response in time, where the log cannot tell it better.
+        /// Standard deviation of a shift of the whole response in time, where the log cannot tell it better; that of a parameter that is a time is no less.
         clock: f64 = 0.05 "periods", Judgement: "a model knows to a tenth of a period when something acted: windings and filters take that long";
         /// Half the interval over the value, from which a parameter counts as not determined.
         not_pinned: f64 = 1.0 "1", Convention: "the interval contains zero";
