@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use loopsight_model::model::ModelParameter;
-use loopsight_model::run::Run;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -14,9 +13,7 @@ use crate::fitted::Fit;
 use crate::flatness::Flatness;
 use crate::problem::Problem;
 use crate::settings::Method;
-
-/// Unit of parameters that are times.
-const TIME: &str = "s";
+use crate::stamps::shortest_period;
 
 /// A parameter by its index, with the unknowns that it is made of, and how much 1 of each is of it.
 type Shares = (usize, Vec<(usize, f64)>);
@@ -97,12 +94,16 @@ impl Problem<'_> {
         })
     }
 
-    /// Variance of a parameter that is a time, at the least, s²: windings and filters that the model leaves out take some, too,
-    /// and nothing in a log tells theirs from that of a delay.
-    fn least_variance_of_times(&self) -> f64 {
-        let periods = self.runs.iter().map(Run::median_period);
-        let period = periods.fold(f64::INFINITY, f64::min);
-        (self.work.criteria().parameters.clock * period).powi(2)
+    /// The `variance` of a parameter. That of a time has a least value: windings and filters that the model leaves out take some,
+    /// too, and nothing in a log tells theirs from that of a delay.
+    fn variance_of(&self, parameter: &ModelParameter, variance: f64) -> f64 {
+        if !parameter.is_time() {
+            return variance;
+        }
+        let clock = self.work.criteria().parameters.clock;
+        let least = (clock * shortest_period(self.runs)).powi(2);
+        // What is not known stays so.
+        if variance < least { least } else { variance }
     }
 
     /// What is known of the parameters at unknowns whose scaled `covariance` is this.
@@ -116,12 +117,8 @@ impl Problem<'_> {
         };
         let n = estimated.len();
         let mut own = DMatrix::from_fn(n, n, of);
-        let least = self.least_variance_of_times();
         for (k, (index, _)) in estimated.iter().enumerate() {
-            if self.model.parameters[*index].unit == TIME {
-                let variance = &mut own[(k, k)];
-                *variance = variance.max(least);
-            }
+            own[(k, k)] = self.variance_of(&self.model.parameters[*index], own[(k, k)]);
         }
         let open =
             |(_, shares): &Shares| shares.iter().any(|(c, _)| flatness.is_open(*c).is_some());
@@ -146,7 +143,8 @@ impl Problem<'_> {
             let parameter = &self.model.parameters[index];
             let each = columns.iter().zip(self.runs).map(|(c, run)| {
                 let value = solution[*c] * self.scales[*c];
-                let error = root(covariance[(*c, *c)]).map(|error| error * self.scales[*c]);
+                let variance = covariance[(*c, *c)] * self.scales[*c].powi(2);
+                let error = root(self.variance_of(parameter, variance));
                 let open = flatness.is_open(*c);
                 let error = error.filter(|_| open.is_none());
                 let mut estimate = self.estimate(parameter, value, error, quantile);
@@ -314,6 +312,30 @@ mod tests {
         }
         // 95 % of 90; of 1000 such counts one is below 79.
         assert!((79..=90).contains(&inside), "{inside} of {of}");
+    }
+
+    /// However little noise there is, a delay is known no better than the instant at which something acted; in each run, too.
+    #[test]
+    fn a_delay_is_no_better_known_than_the_instant() {
+        let late = "[[effect]]\n[effect.input_delay]\nat = [\"input\"]\ndelay = 0.03\n";
+        let truth = axis(8.0, late);
+        let mut seed = 5;
+        let runs = ["a", "b"].map(|name| run(&truth, name, 1e-5, &mut seed));
+        let least = 0.05 * runs[0].median_period();
+        let fitted = |rest: &str| {
+            let model = axis(8.0, &format!("{late}{rest}"));
+            fit(&model, &on(&runs), &FitSettings::default(), &Work::quiet()).unwrap()
+        };
+        let all = fitted("").parameters["input_delay.delay"].std_error;
+        assert!(all.unwrap() >= 0.999 * least, "{all:?} {least}");
+        let found = fitted("[fit]\nper_run = [\"input_delay.delay\"]\n");
+        for each in &found.per_run["input_delay.delay"] {
+            assert!(
+                each.estimate.std_error.unwrap() >= 0.999 * least,
+                "{each:?}"
+            );
+        }
+        assert!(found.parameters["K_C"].std_error.unwrap() < 1e-3);
     }
 
     /// What differs from run to run stands in for nothing: friction is named, with the gains of the runs in the model.

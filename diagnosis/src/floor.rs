@@ -9,6 +9,7 @@ use loopsight_model::sensor::Sensor;
 use crate::criteria::LogCriteria;
 use crate::long::pieces;
 use crate::score::Tally;
+use crate::stamps::shortest_period;
 
 /// `nrmse` over all signals of a model without any fault.
 ///
@@ -169,8 +170,7 @@ pub(crate) fn noise(
 /// least change in the log.
 pub(crate) fn rounding(sensor: &Sensor, signal: usize, runs: &[Run]) -> f64 {
     if let Sensor::EncoderCounts(encoder) = sensor {
-        let periods = runs.iter().map(Run::median_period);
-        return encoder.noise(periods.fold(f64::INFINITY, f64::min));
+        return encoder.noise(shortest_period(runs));
     }
     let mut tally = Tally::default();
     let mut all: Vec<Vec<f64>> = Vec::new();

@@ -274,10 +274,10 @@ impl State {
             let hardly = fell_to >= improve.better;
             let incomplete = last.nrmse_test > missing.above_floor * floor;
             let tradeable = fell_to >= improve.worth_blurring;
-            let of_last = || estimated(&present, last).into_iter().map(|(_, e)| e);
             let idle = hardly && is_undetermined(&present, last, missing.undetermined)
-                || tradeable && is_mostly_open(&present, last)
-                || tradeable && stands_in(of_last());
+                || tradeable
+                    && (is_mostly_open(&present, last)
+                        || stands_in(estimated(&present, last).into_iter().map(|(_, e)| e)));
             let may_blur = incomplete && tradeable;
             if present.cancelled || !idle && !may_blur {
                 return Ok(present);

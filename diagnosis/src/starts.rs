@@ -11,6 +11,7 @@ use crate::candidates::Candidate;
 use crate::judge::nrmse;
 use crate::problem::{Problem, declared};
 use crate::settings::FitSettings;
+use crate::stamps::shortest_period;
 use crate::trial::{FINAL, Judged, Nominal};
 use crate::unfold::unfolded;
 
@@ -29,10 +30,9 @@ pub(crate) struct Extent {
 impl Extent {
     pub(crate) fn of(runs: &[Run]) -> Self {
         let longest = runs.iter().map(Run::duration).fold(0.0, f64::max);
-        let periods = runs.iter().map(Run::median_period);
         Self {
             duration: longest,
-            period: periods.fold(f64::INFINITY, f64::min),
+            period: shortest_period(runs),
         }
     }
 

@@ -28,7 +28,7 @@ pub(crate) fn does_something(explanation: &Explanation, least: f64, shift: f64) 
         .filter(|p| !has_size || p.declaration.default == Some(0.0))
         .any(|p| {
             let away = p.value.zip(p.declaration.default);
-            let shift = if p.unit == "s" { shift } else { 0.0 };
+            let shift = if p.is_time() { shift } else { 0.0 };
             let enough = shift.max(least * p.scale());
             away.is_none_or(|(value, neutral)| (value - neutral).abs() > enough)
         })

@@ -47,6 +47,11 @@ impl Origin {
 }
 
 impl ModelParameter {
+    /// Whether it is a time: a delay, a lag, a window.
+    pub fn is_time(&self) -> bool {
+        self.unit == "s"
+    }
+
     /// Size of a noticeable change, in `unit`.
     pub fn scale(&self) -> f64 {
         self.declaration.scale * self.size
