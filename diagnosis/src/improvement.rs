@@ -44,17 +44,28 @@ pub struct Improvement {
 }
 
 impl Improvement {
-    /// What to record next: to tell what was added from what the data still cannot tell from it, and what the last diagnosis
-    /// asks for. What earlier rounds asked is settled.
+    /// What to record next: to tell what was added from what the data still cannot tell from it, and what the verdict
+    /// asks for. What earlier rounds asked is settled, and so is what a last one asked of an effect that was not added.
     pub fn advice(&self) -> Vec<Advice> {
         let open = self.steps.iter().filter_map(|step| {
             let place = step.added.as_ref()?;
             Some(to_tell_apart(place, &step.still_open))
         });
         let mut all: Vec<Advice> = open.flatten().collect();
-        for one in self.diagnoses.last().iter().flat_map(|d| &d.advice) {
-            if !all.contains(one) {
-                all.push(one.clone());
+        let mut asked = Vec::new();
+        if let Some(last) = self.diagnoses.last() {
+            let unadded = match last.candidates.first() {
+                Some(best) if last.verdict != self.verdict => {
+                    to_tell_apart(&best.place, &best.indistinguishable_from)
+                }
+                _ => Vec::new(),
+            };
+            let stays = |one: &&Advice| !unadded.contains(one);
+            asked.extend(last.advice.iter().filter(stays).cloned());
+        }
+        for one in asked {
+            if !all.contains(&one) {
+                all.push(one);
             }
         }
         all
