@@ -104,6 +104,7 @@ mod in_motion;
 mod judge;
 mod levenberg_marquardt;
 mod long;
+mod looks;
 mod measurements;
 mod motion;
 mod narrow;

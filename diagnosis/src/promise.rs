@@ -52,7 +52,7 @@ impl<'a> Promises<'a> {
         }
     }
 
-    /// The cost that a candidate promises, from one start.
+    /// The cost that a candidate promises, from one start; infinite where it promises nothing. None where its simulation fails.
     pub(crate) fn of(&self, candidate: &Candidate, start: &[f64]) -> Option<f64> {
         let nominal = self.nominal;
         nominal.work.go_on().ok()?;
@@ -93,7 +93,11 @@ impl<'a> Promises<'a> {
             Some(_) => {
                 let promising =
                     after < criteria.promising * before || before < criteria.told * plain;
-                promising.then(|| plain * after / before)
+                Some(if promising {
+                    plain * after / before
+                } else {
+                    f64::INFINITY
+                })
             }
             None => Some(after),
         }

@@ -9,20 +9,13 @@ use crate::both_ways::is_the_same_both_ways;
 use crate::candidates::Candidate;
 use crate::conclusion::Explanation;
 use crate::criteria::{Criteria, SearchCriteria};
-use crate::early::{Finding, Promised, TOLD};
-use crate::explain::{explain, place};
+use crate::early::Finding;
+use crate::explain::explain;
 use crate::judge::nrmse;
 use crate::progress::{Stage, Work};
-use crate::promise::Promises;
-use crate::starts::{Extent, first_starts, fresh_starts, starts_from};
+use crate::starts::{Extent, starts_from};
 use crate::substance::{does_something, is_a_simpler_one};
 use crate::trial::{Judged, Nominal, finish, look};
-
-/// Short fits that are made to their end whatever they find. They show how far the others have to come.
-const MOST_PROMISING: usize = 4;
-
-/// A candidate by its index, and where to start it from.
-type Attempt = (usize, Vec<f64>);
 
 /// A search among candidates.
 pub(crate) struct Search<'a> {
@@ -33,22 +26,6 @@ pub(crate) struct Search<'a> {
     pub(crate) extent: Extent,
     /// How late time stamps may be of their own, s.
     pub(crate) shift: f64,
-}
-
-/// The candidates that were looked at.
-struct Looked {
-    /// By their indices.
-    found: Vec<(usize, Judged)>,
-    /// What the best of them leaves. Of the root of its cost and the error that it is ranked by the larger one counts: what
-    /// a fit sees may be easier than the rest of the log, or harder.
-    least: f64,
-}
-
-impl Looked {
-    const NOTHING: Self = Self {
-        found: Vec::new(),
-        least: f64::INFINITY,
-    };
 }
 
 /// What a search found.
@@ -123,7 +100,13 @@ impl Search<'_> {
             let looked = best_first(looked);
             return Found { finalists, looked };
         }
-        let contest = contest(looked, self.work.criteria());
+        let least = least(looked.iter().map(|(_, found)| found));
+        let mut contest = contest(looked, self.work.criteria());
+        let mut place = 0;
+        contest.retain(|found| {
+            place += 1;
+            place <= self.criteria().finalists_at_least || !self.came_beside(found.error(), least)
+        });
         let of = contest.len() as u64;
         let done = AtomicU64::new(0);
         self.work.tell(Stage::Finalists, 0, of);
@@ -152,7 +135,7 @@ impl Search<'_> {
         Found { finalists, looked }
     }
 
-    fn criteria(&self) -> &SearchCriteria {
+    pub(crate) fn criteria(&self) -> &SearchCriteria {
         &self.work.criteria().search
     }
 
@@ -205,202 +188,14 @@ impl Search<'_> {
     }
 
     /// One more is done of a stage.
-    fn tell(&self, stage: Stage, done: &AtomicU64, of: u64) {
+    pub(crate) fn tell(&self, stage: Stage, done: &AtomicU64, of: u64) {
         let now = done.fetch_add(1, Ordering::Relaxed) + 1;
         self.work.tell(stage, now.min(of), of);
-    }
-
-    /// All that were looked at, by their indices.
-    fn looked_at(&self) -> Vec<(usize, Judged)> {
-        let attempts: Vec<Attempt> = (self.all.iter().enumerate())
-            .filter(|(_, c)| !c.separate && !c.further)
-            .flat_map(|(i, c)| {
-                let starts = first_starts(c, self.nominal.model, self.extent);
-                let fresh = fresh_starts(c, self.nominal, self.extent);
-                starts.into_iter().chain(fresh).map(move |start| (i, start))
-            })
-            .collect();
-        let promising = self.promising(attempts);
-        let simple = |i: usize| !promising.iter().any(|(j, _)| self.grows(i, *j));
-        let (first, mut waiting): (Vec<Attempt>, Vec<Attempt>) =
-            promising.iter().cloned().partition(|(i, _)| simple(*i));
-        let mut tried: BTreeSet<usize> = first.iter().map(|(i, _)| *i).collect();
-        let mut looked = Looked::NOTHING;
-        let (most, others) = first.split_at(first.len().min(MOST_PROMISING));
-        self.look_at(most, others.len() + waiting.len(), &mut looked);
-        self.look_at(others, waiting.len(), &mut looked);
-        // A candidate that contains another one comes after it, and starts from where that one ended. Where that
-        // one failed, it starts from its own best start.
-        while !self.work.is_cancelled() {
-            let mut next = self.grown(&looked.found, &tried, &mut waiting);
-            next.append(&mut waiting);
-            if next.is_empty() {
-                break;
-            }
-            tried.extend(next.iter().map(|(i, _)| *i));
-            self.look_at(&next, 0, &mut looked);
-        }
-        looked.found
-    }
-
-    /// All that were looked at from the values of the model as it was given, by their indices. A promise says nothing so far
-    /// from the machine, so each candidate gets a short fit.
-    fn looked_at_from_given(&self) -> Vec<(usize, Judged)> {
-        let attempts: Vec<Attempt> = (self.all.iter().enumerate())
-            .filter(|(_, c)| !c.separate && !c.further && c.replaces.is_none())
-            .filter_map(|(i, c)| {
-                let starts = first_starts(c, self.nominal.given, self.extent);
-                Some((i, starts.into_iter().next()?))
-            })
-            .collect();
-        let mut looked = Looked::NOTHING;
-        self.look_at(&attempts, 0, &mut looked);
-        looked.found
-    }
-
-    /// The starts that promise most, the best first.
-    fn promising(&self, attempts: Vec<Attempt>) -> Vec<Attempt> {
-        let (done, of) = (AtomicU64::new(0), attempts.len() as u64);
-        self.work.tell(Stage::Promises, 0, of);
-        let promises = Promises::new(self.nominal);
-        let mut promising: Vec<(f64, Attempt)> = attempts
-            .into_par_iter()
-            .filter_map(|(i, start)| {
-                let candidate = self.all[i].chosen(&start);
-                let promise = promises.of(&candidate, &start);
-                self.tell(Stage::Promises, &done, of);
-                Some((promise?, (i, start)))
-            })
-            .collect();
-        promising.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let criteria = self.criteria();
-        // An effect with many starts must not crowd the others out.
-        let mut taken = vec![0; self.all.len()];
-        promising.retain(|(_, (i, _))| {
-            taken[*i] += 1;
-            taken[*i] <= criteria.looks_each
-        });
-        promising.truncate(criteria.looks);
-        self.work.know(|| self.promised(&promising));
-        promising.into_iter().map(|(_, attempt)| attempt).collect()
-    }
-
-    /// The effects that promise most, each at its most promising place.
-    fn promised(&self, promising: &[(f64, Attempt)]) -> Finding {
-        let mut seen = BTreeSet::new();
-        let candidates = (promising.iter())
-            .map(|(cost, (i, _))| (cost, &self.all[*i]))
-            .filter(|(_, candidate)| seen.insert(candidate.meta.id))
-            .take(TOLD)
-            .map(|(cost, candidate)| Promised {
-                place: place(candidate),
-                nrmse: cost.sqrt(),
-            })
-            .collect();
-        Finding::Promised { candidates }
-    }
-
-    /// Makes the short fits of some attempts; `waiting` more are to come. What cannot come as near to the best so far as a
-    /// finalist must is given up.
-    fn look_at(&self, attempts: &[Attempt], waiting: usize, looked: &mut Looked) {
-        let before = looked.found.len();
-        let done = AtomicU64::new(before as u64);
-        let of = (before + attempts.len() + waiting) as u64;
-        self.work.tell(Stage::FirstLooks, before as u64, of);
-        let worth = self.criteria().behind * looked.least;
-        let found: Vec<(usize, (Judged, f64))> = (attempts.par_iter())
-            .filter_map(|(i, start)| {
-                let found = self.look(*i, start, worth);
-                self.tell(Stage::FirstLooks, &done, of);
-                Some((*i, found?))
-            })
-            .collect();
-        for (i, (judged, left)) in found {
-            looked.least = looked.least.min(left.max(judged.error()));
-            looked.found.push((i, judged));
-        }
-    }
-
-    /// A short fit of a candidate, from its start, and the root of its cost; given up where that cannot come below `worth`.
-    /// The plain model is its special case. Where the fit ended well above that one, the start was too strong for this
-    /// machine, and it is made again from next to nothing.
-    fn look(&self, i: usize, start: &[f64], worth: f64) -> Option<(Judged, f64)> {
-        let candidate = &self.all[i];
-        let found = look(&candidate.chosen(start), start, self.nominal, worth);
-        let most = self.criteria().elsewhere * nrmse(self.nominal.rank);
-        if found
-            .as_ref()
-            .is_some_and(|(found, _)| found.error() <= most)
-        {
-            return found;
-        }
-        let again = candidate.faint(start).and_then(|faint| {
-            let chosen = candidate.chosen(&faint);
-            look(&chosen, &faint, self.nominal, worth)
-        });
-        found
-            .into_iter()
-            .chain(again)
-            .min_by(|(a, _), (b, _)| a.error().total_cmp(&b.error()))
-    }
-
-    /// Whether a candidate should start from where another one ended. Strong breakaway friction is found when
-    /// starting from dry friction, not from none; a level for each wheel from one level for both. A fuller form of an effect
-    /// starts from its usual one.
-    fn grows(&self, i: usize, from: usize) -> bool {
-        let (candidate, other) = (&self.all[i], &self.all[from]);
-        let contains =
-            other.is_special(candidate) && !candidate.separate && candidate.replaces.is_none();
-        let itself = candidate.meta.id == other.meta.id && candidate.at == other.at;
-        let divides = candidate.separate && itself;
-        (contains || divides) && (itself || !candidate.further) && !other.separate
-    }
-
-    /// Attempts at candidates that were not tried yet, starting from where simpler ones ended. They are taken
-    /// out of `waiting`. What ended at the floor has left nothing for a larger one.
-    fn grown(
-        &self,
-        looked: &[(usize, Judged)],
-        tried: &BTreeSet<usize>,
-        waiting: &mut Vec<Attempt>,
-    ) -> Vec<Attempt> {
-        let criteria = self.criteria();
-        let least_of_all = least(looked.iter().map(|(_, found)| found));
-        let mut attempts = Vec::new();
-        for (i, candidate) in self.all.iter().enumerate() {
-            let simpler = looked
-                .iter()
-                .filter(|(j, _)| !tried.contains(&i) && self.grows(i, *j))
-                .map(|(_, found)| found)
-                .min_by(|a, b| a.error().total_cmp(&b.error()));
-            let Some(simpler) = simpler else { continue };
-            let error = simpler.error();
-            let places = looked.iter().map(|(_, found)| found).filter(|found| {
-                found.candidate.meta.id == simpler.candidate.meta.id && !found.candidate.separate
-            });
-            let elsewhere = error > criteria.elsewhere * least(places);
-            let divided = error < criteria.worth_dividing * nrmse(self.nominal.rank);
-            let of = simpler.candidate.complexity();
-            let allowance = (self.work.criteria().choice).allowance(candidate.complexity(), of);
-            // A fuller form comes where it is better at all.
-            let nothing_left = !candidate.further && error <= allowance * self.nominal.floor;
-            let starts = starts_from(candidate, simpler, self.extent);
-            let worth = error < criteria.worth_growing * least_of_all
-                && (!candidate.separate || divided)
-                && starts.len() <= criteria.grown_starts;
-            if elsewhere || worth || nothing_left {
-                waiting.retain(|(j, _)| i != *j);
-            }
-            if worth && !elsewhere && !nothing_left {
-                attempts.extend(starts.into_iter().map(|start| (i, start)));
-            }
-        }
-        attempts
     }
 }
 
 /// The least error among some candidates.
-fn least<'j>(found: impl Iterator<Item = &'j Judged>) -> f64 {
+pub(crate) fn least<'j>(found: impl Iterator<Item = &'j Judged>) -> f64 {
     found.map(Judged::error).fold(f64::INFINITY, f64::min)
 }
 

@@ -172,14 +172,17 @@ pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fi
     // With the sharpest sign possible.
     let criteria = nominal.criteria();
     let widths = [criteria.sharpest, criteria.sharp];
-    let sharp = widths.iter().find_map(|share| {
-        let sharp = Judged {
-            candidate: first.candidate.smoothed(*share)?,
-            ..first.clone()
-        };
-        fully(sharp, nominal, criteria.wild)
-    });
-    let broad = fully(first, nominal, f64::INFINITY);
+    let sharp = || {
+        widths.iter().find_map(|share| {
+            let sharp = Judged {
+                candidate: first.candidate.smoothed(*share)?,
+                ..first.clone()
+            };
+            fully(sharp, nominal, criteria.wild)
+        })
+    };
+    let broad = || fully(first.clone(), nominal, f64::INFINITY);
+    let (sharp, broad) = rayon::join(sharp, broad);
     let error = |found: &(Judged, Fit)| found.0.error();
     let of = |found: &Option<(Judged, Fit)>| found.as_ref().map_or(f64::INFINITY, error);
     // The width is one more parameter: it must explain significantly more.
