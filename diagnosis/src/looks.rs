@@ -131,11 +131,18 @@ impl Search<'_> {
     }
 
     /// Whether a candidate that promises a `cost` has nothing to do with what is missing: the best of those `looked` at
-    /// explains the log, and of what that one explains it promises to explain next to nothing.
+    /// explains the log, and of what that one explains it promises to explain next to nothing. One that promises to do worse
+    /// than the plain model starts too far from it to tell.
     fn is_beside(&self, cost: f64, looked: &Looked) -> bool {
         let plain = self.nominal.cost;
-        self.is_explained(looked.error)
+        self.tells(cost)
+            && self.is_explained(looked.error)
             && plain - cost < self.criteria().beside * (plain - looked.cost)
+    }
+
+    /// Whether a promised `cost` tells anything.
+    fn tells(&self, cost: f64) -> bool {
+        cost <= self.criteria().elsewhere.powi(2) * self.nominal.cost || cost.is_infinite()
     }
 
     /// The same of one that leaves an `error`, where the best leaves the `least`.
@@ -194,14 +201,13 @@ impl Search<'_> {
             let best = || of().min_by(|a, b| a.0.total_cmp(&b.0));
             same.or_else(best).map(|(cost, _)| *cost)
         };
-        let alike = looked
-            .best
-            .is_some_and(|best| self.acts_on_both_sides(best));
+        let alike = self.is_explained(looked.error)
+            && (looked.best).is_some_and(|best| self.acts_on_both_sides(best));
         parts.retain(|(i, start)| {
             let whole = (0..self.all.len()).filter(|j| self.is_part(*i, *j));
             let mut whole = whole.filter(|j| alike && self.acts_on_both_sides(*j));
-            let beside = |cost: f64| self.is_beside(cost, looked);
-            let asked = whole.all(|j| !promised_by(j, start).is_some_and(beside));
+            let idle = |cost: f64| !self.tells(cost) || self.is_beside(cost, looked);
+            let asked = whole.all(|j| !promised_by(j, start).is_some_and(idle));
             if !asked {
                 self.tell(Stage::Promises, &done, of);
             }
