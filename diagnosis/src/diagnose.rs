@@ -34,8 +34,9 @@ use crate::trial::{FINAL, Judged, Nominal};
 use crate::untried::untried;
 use crate::where_it_fails::{predictable, where_it_fails};
 
-/// Adds every effect of the library to `model` at every channel it fits, and refits all parameters each time.
-/// Each is judged by its free run on validation data.
+/// Tries every effect of the library at every channel of `model` that it fits. One Gauss–Newton step says what each promises.
+/// Those that promise most are fitted, with all parameters of the model, and judged by their free run on validation data.
+/// Once one of them explains the log, what promises next to nothing beside it is left out.
 ///
 /// Where no effect explains what the model does not, the best of them are tried in pairs.
 ///

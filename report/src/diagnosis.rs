@@ -74,10 +74,10 @@ fn untried(diagnosis: &Diagnosis) -> String {
 }
 
 /// What is to be seen in a list of explanations.
-pub(crate) const CANDIDATES: &str = "Every effect that the log can show was added to the model at every place where it \
-    fits. All parameters were fitted again, and the free run was judged on data that the fit did not see. The \
-    first candidate is the simplest that is not clearly worse than the best. The others follow by their error. \
-    Tap a candidate to see what it is and what helps against it.";
+pub(crate) const CANDIDATES: &str = "Every effect that the log can show was tried at every place where it fits: one step of \
+    a fit says what it promises. Where it promised most, all parameters were fitted again, and the free run was judged on \
+    data that the fit did not see. The first candidate is the simplest that is not clearly worse than the best. The others \
+    follow by their error. Tap a candidate to see what it is and what helps against it.";
 
 /// Measured and models over time.
 pub(crate) fn against_measurements(
