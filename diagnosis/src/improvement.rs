@@ -52,7 +52,6 @@ impl Improvement {
             Some(to_tell_apart(place, &step.still_open))
         });
         let mut all: Vec<Advice> = open.flatten().collect();
-        let mut asked = Vec::new();
         if let Some(last) = self.diagnoses.last() {
             let unadded = match last.candidates.first() {
                 Some(best) if last.verdict != self.verdict => {
@@ -60,12 +59,10 @@ impl Improvement {
                 }
                 _ => Vec::new(),
             };
-            let stays = |one: &&Advice| !unadded.contains(one);
-            asked.extend(last.advice.iter().filter(stays).cloned());
-        }
-        for one in asked {
-            if !all.contains(&one) {
-                all.push(one);
+            for one in &last.advice {
+                if !all.contains(one) && !unadded.contains(one) {
+                    all.push(one.clone());
+                }
             }
         }
         all

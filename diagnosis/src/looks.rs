@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicU64;
 
 use rayon::prelude::*;
 
-use crate::criteria::{Criteria, SearchCriteria};
+use crate::criteria::Criteria;
 use crate::early::{Finding, Promised, TOLD};
 use crate::explain::place;
 use crate::judge::nrmse;
@@ -40,9 +40,7 @@ struct Looked {
     /// What the best of them leaves. Of the root of its cost and the error that it is ranked by the larger one counts: what
     /// a fit sees may be easier than the rest of the log, or harder.
     least: f64,
-    /// The least error of any, the candidate that leaves it, and the least cost.
-    error: f64,
-    best: Option<usize>,
+    /// The least cost of any.
     cost: f64,
 }
 
@@ -51,10 +49,19 @@ impl Looked {
         found: Vec::new(),
         attempts: Vec::new(),
         least: f64::INFINITY,
-        error: f64::INFINITY,
-        best: None,
         cost: f64::INFINITY,
     };
+
+    /// The candidate that leaves the least error, and how much that is.
+    fn best(&self) -> Option<(usize, f64)> {
+        let errors = self.found.iter().map(|(i, found)| (*i, found.error()));
+        errors.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// The least error of any.
+    fn error(&self) -> f64 {
+        least(self.found.iter().map(|(_, found)| found))
+    }
 }
 
 impl Search<'_> {
@@ -62,11 +69,9 @@ impl Search<'_> {
     pub(crate) fn looked_at(&self) -> Vec<(usize, Judged)> {
         let mut looked = Looked::NOTHING;
         let promising = self.promising(&mut looked);
-        let of_promising = |i: &usize| promising.iter().any(|(_, (j, _))| i == j);
-        let simple = |i: usize| !promising.iter().any(|(_, (j, _))| self.grows(i, *j));
-        let mut tried: BTreeSet<usize> = (0..self.all.len())
-            .filter(|i| of_promising(i) && simple(*i))
-            .collect();
+        let simple = |i: usize| self.is_simple(i, &promising);
+        let all = promising.iter().map(|(_, (i, _))| *i);
+        let mut tried: BTreeSet<usize> = all.filter(|i| simple(*i)).collect();
         let again = |(_, attempt): &Promising| looked.attempts.contains(attempt);
         let rest = promising.iter().filter(|one| !again(one)).cloned();
         let (mut others, mut waiting): (Vec<Promising>, Vec<Promising>) =
@@ -83,7 +88,7 @@ impl Search<'_> {
             if others.is_empty() || self.work.is_cancelled() {
                 break;
             }
-            let many = if self.is_explained(looked.error) {
+            let many = if self.is_explained(looked.error()) {
                 others.len()
             } else {
                 looked.attempts.len().max(FIRST_LOOKS).min(others.len())
@@ -130,14 +135,19 @@ impl Search<'_> {
             && search.elsewhere * least <= nrmse(self.nominal.rank)
     }
 
+    /// What a candidate may leave at most, as a cost or the square of an error, so that it explains its share of what the
+    /// `best` one explains of the `plain` model's.
+    fn beside(&self, plain: f64, best: f64) -> f64 {
+        plain - self.criteria().beside * (plain - best)
+    }
+
     /// Whether a candidate that promises a `cost` has nothing to do with what is missing: the best of those `looked` at
     /// explains the log, and of what that one explains it promises to explain next to nothing. One that promises to do worse
     /// than the plain model starts too far from it to tell.
     fn is_beside(&self, cost: f64, looked: &Looked) -> bool {
-        let plain = self.nominal.cost;
         self.tells(cost)
-            && self.is_explained(looked.error)
-            && plain - cost < self.criteria().beside * (plain - looked.cost)
+            && self.is_explained(looked.error())
+            && cost > self.beside(self.nominal.cost, looked.cost)
     }
 
     /// Whether a promised `cost` tells anything.
@@ -145,22 +155,23 @@ impl Search<'_> {
         cost <= self.criteria().elsewhere.powi(2) * self.nominal.cost || cost.is_infinite()
     }
 
-    /// The same of one that leaves an `error`, where the best leaves the `least`.
+    /// Whether a candidate that leaves an `error`, where the best leaves the `least`, has nothing to do with what is missing.
     pub(crate) fn came_beside(&self, error: f64, least: f64) -> bool {
-        let plain = nrmse(self.nominal.rank).powi(2);
-        self.is_explained(least)
-            && plain - error.powi(2) < self.criteria().beside * (plain - least.powi(2))
+        let plain = nrmse(self.nominal.rank);
+        self.is_explained(least) && error.powi(2) > self.beside(plain.powi(2), least.powi(2))
     }
 
     /// The root of the cost that a short fit must come below, with what those `looked` at came to.
     fn worth(&self, looked: &Looked) -> f64 {
-        let SearchCriteria { behind, beside, .. } = self.criteria();
-        let mut most = behind * looked.least;
-        if self.is_explained(looked.error) {
-            let plain = self.nominal.cost;
-            most = most.min((plain - beside * (plain - looked.cost)).max(0.0).sqrt());
+        let behind = self.criteria().behind * looked.least;
+        if self.is_explained(looked.error()) {
+            let beside = self.beside(self.nominal.cost, looked.cost);
+            behind.min(beside.max(0.0).sqrt())
+        } else if looked.attempts.len() < MOST_PROMISING {
+            f64::INFINITY
+        } else {
+            behind
         }
-        most
     }
 
     /// The starts that promise most, with what they promise, the best first.
@@ -191,8 +202,8 @@ impl Search<'_> {
         };
         let mut all = promised(whole);
         let best = self.best_of(all.clone());
-        let simple = |i: usize| !best.iter().any(|(_, (j, _))| self.grows(i, *j));
-        let first = best.iter().filter(|(_, (i, _))| simple(*i)).cloned();
+        let simple = |one: &&Promising| self.is_simple(one.1.0, &best);
+        let first = best.iter().filter(simple).cloned();
         self.look_each(&attempts(first.take(FIRST_LOOKS)), looked, &|| {});
         // What another candidate promises, from the same start or else from its best one.
         let promised_by = |j: usize, start: &[f64]| {
@@ -201,22 +212,28 @@ impl Search<'_> {
             let best = || of().min_by(|a, b| a.0.total_cmp(&b.0));
             same.or_else(best).map(|(cost, _)| *cost)
         };
-        let alike = self.is_explained(looked.error)
-            && (looked.best).is_some_and(|best| self.acts_on_both_sides(best));
-        parts.retain(|(i, start)| {
-            let whole = (0..self.all.len()).filter(|j| self.is_part(*i, *j));
-            let mut whole = whole.filter(|j| alike && self.acts_on_both_sides(*j));
+        let explained = |(best, error)| self.is_explained(error) && self.acts_on_both_sides(best);
+        if looked.best().is_some_and(explained) {
             let idle = |cost: f64| !self.tells(cost) || self.is_beside(cost, looked);
-            let asked = whole.all(|j| !promised_by(j, start).is_some_and(idle));
-            if !asked {
-                self.tell(Stage::Promises, &done, of);
-            }
-            asked
-        });
+            parts.retain(|(i, start)| {
+                let whole = (0..self.all.len()).filter(|j| self.is_part(*i, *j));
+                let mut whole = whole.filter(|j| self.acts_on_both_sides(*j));
+                let asked = whole.all(|j| !promised_by(j, start).is_some_and(idle));
+                if !asked {
+                    self.tell(Stage::Promises, &done, of);
+                }
+                asked
+            });
+        }
         all.extend(promised(parts));
         let best = self.best_of(all);
         self.work.know(|| self.promised(&best));
         best
+    }
+
+    /// Whether a candidate grows from none of those that are `promising`.
+    fn is_simple(&self, i: usize, promising: &[Promising]) -> bool {
+        !promising.iter().any(|(_, (j, _))| self.grows(i, *j))
     }
 
     /// Whether a candidate is the effect of another one at some of its places.
@@ -286,12 +303,7 @@ impl Search<'_> {
     /// Makes the short fits of some attempts, `and` does something after each. What cannot come as near to the best so far as
     /// a finalist must is given up.
     fn look_each(&self, attempts: &[Attempt], looked: &mut Looked, and: &(dyn Fn() + Sync)) {
-        let early = looked.attempts.len() < MOST_PROMISING;
-        let worth = if early && !self.is_explained(looked.error) {
-            f64::INFINITY
-        } else {
-            self.worth(looked)
-        };
+        let worth = self.worth(looked);
         let found: Vec<(usize, (Judged, f64))> = (attempts.par_iter())
             .filter_map(|(i, start)| {
                 let found = self.look(*i, start, worth);
@@ -302,9 +314,6 @@ impl Search<'_> {
         looked.attempts.extend_from_slice(attempts);
         for (i, (judged, left)) in found {
             looked.least = looked.least.min(left.max(judged.error()));
-            if judged.error() < looked.error {
-                (looked.error, looked.best) = (judged.error(), Some(i));
-            }
             looked.cost = looked.cost.min(left * left);
             looked.found.push((i, judged));
         }

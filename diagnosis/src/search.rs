@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::both_ways::is_the_same_both_ways;
 use crate::candidates::Candidate;
 use crate::conclusion::Explanation;
-use crate::criteria::{Criteria, SearchCriteria};
+use crate::criteria::SearchCriteria;
 use crate::early::Finding;
 use crate::explain::explain;
 use crate::judge::nrmse;
@@ -100,13 +100,7 @@ impl Search<'_> {
             let looked = best_first(looked);
             return Found { finalists, looked };
         }
-        let least = least(looked.iter().map(|(_, found)| found));
-        let mut contest = contest(looked, self.work.criteria());
-        let mut place = 0;
-        contest.retain(|found| {
-            place += 1;
-            place <= self.criteria().finalists_at_least || !self.came_beside(found.error(), least)
-        });
+        let contest = self.contest(looked);
         let of = contest.len() as u64;
         let done = AtomicU64::new(0);
         self.work.tell(Stage::Finalists, 0, of);
@@ -187,6 +181,48 @@ impl Search<'_> {
             .collect()
     }
 
+    /// Those of the candidates looked at that are fitted to the end, the best first.
+    fn contest(&self, mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
+        let (close, criteria) = (self.work.criteria().choice.close, self.criteria());
+        let least = least(looked.iter().map(|(_, found)| found));
+        looked.sort_by(|a, b| a.1.error().total_cmp(&b.1.error()));
+        let mut finalists: Vec<Judged> = Vec::new();
+        for k in 0..looked.len() {
+            let (i, found) = &looked[k];
+            let (id, error) = (found.candidate.meta.id, found.error());
+            // Of several starts of one candidate the best counts.
+            let again = looked[..k].iter().any(|(j, _)| i == j);
+            let needless = looked.iter().any(|(_, other)| {
+                spares(&other.candidate, &found.candidate) && other.error() < close * error
+            });
+            let siblings: Vec<&Judged> = (finalists.iter())
+                .filter(|j| j.candidate.meta.id == id)
+                .collect();
+            let elsewhere = siblings.first().is_some_and(|best| {
+                best.candidate.at != found.candidate.at && error > criteria.elsewhere * best.error()
+            });
+            // A special case of one that did well may only need more iterations, so it may stay.
+            let special = |j: &Judged| found.candidate.is_special(&j.candidate);
+            let best = finalists.first();
+            let far = best.is_some_and(|best| error > criteria.behind * best.error())
+                && !finalists.iter().any(special);
+            let places = if far {
+                criteria.finalists_at_least
+            } else {
+                criteria.finalists
+            };
+            // The simplest explanation is not crowded out by what explains less than the one that contains it.
+            let simplest = best.is_some_and(special);
+            let full = finalists.len() >= places && !simplest
+                || finalists.len() >= criteria.finalists_at_least && self.came_beside(error, least);
+            let crowded = siblings.len() >= criteria.finalists_each || full;
+            if !again && !needless && !elsewhere && !crowded {
+                finalists.push(found.clone());
+            }
+        }
+        finalists
+    }
+
     /// One more is done of a stage.
     pub(crate) fn tell(&self, stage: Stage, done: &AtomicU64, of: u64) {
         let now = done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -210,46 +246,6 @@ fn best_first(mut looked: Vec<(usize, Judged)>) -> Vec<Judged> {
     let mut seen = BTreeSet::new();
     looked.retain(|(i, _)| seen.insert(*i));
     looked.into_iter().map(|(_, judged)| judged).collect()
-}
-
-/// Those of the candidates looked at that are fitted to the end, the best first.
-fn contest(mut looked: Vec<(usize, Judged)>, criteria: &Criteria) -> Vec<Judged> {
-    let (close, criteria) = (criteria.choice.close, &criteria.search);
-    looked.sort_by(|a, b| a.1.error().total_cmp(&b.1.error()));
-    let mut finalists: Vec<Judged> = Vec::new();
-    for k in 0..looked.len() {
-        let (i, found) = &looked[k];
-        let (id, error) = (found.candidate.meta.id, found.error());
-        // Of several starts of one candidate the best counts.
-        let again = looked[..k].iter().any(|(j, _)| i == j);
-        let needless = looked.iter().any(|(_, other)| {
-            spares(&other.candidate, &found.candidate) && other.error() < close * error
-        });
-        let siblings: Vec<&Judged> = (finalists.iter())
-            .filter(|j| j.candidate.meta.id == id)
-            .collect();
-        let elsewhere = siblings.first().is_some_and(|best| {
-            best.candidate.at != found.candidate.at && error > criteria.elsewhere * best.error()
-        });
-        // A special case of one that did well may only need more iterations, so it may stay.
-        let special = |j: &Judged| found.candidate.is_special(&j.candidate);
-        let best = finalists.first();
-        let far = best.is_some_and(|best| error > criteria.behind * best.error())
-            && !finalists.iter().any(special);
-        let places = if far {
-            criteria.finalists_at_least
-        } else {
-            criteria.finalists
-        };
-        // The simplest explanation is not crowded out by what explains less than the one that contains it.
-        let simplest = best.is_some_and(special);
-        let full = finalists.len() >= places && !simplest;
-        let crowded = siblings.len() >= criteria.finalists_each || full;
-        if !again && !needless && !elsewhere && !crowded {
-            finalists.push(found.clone());
-        }
-    }
-    finalists
 }
 
 /// Whether `other` makes a candidate needless where both are about as good: it is a special case of the candidate,
