@@ -80,17 +80,27 @@ impl Search<'_> {
         left > start.poor && !helped && self.given_is_elsewhere().unwrap_or(false)
     }
 
-    /// Whether the model as it was given is not where the plain fit ended; none where it lacks values.
+    /// Whether the model as it was given lies in another valley than the one that the plain fit ended in; none where it lacks
+    /// values. They are in one where a Gauss–Newton step from it comes to the cost of that fit, and the fit does as well on
+    /// what it did not see.
     fn given_is_elsewhere(&self) -> Option<bool> {
-        let given = self.nominal.given;
+        let (given, cost) = (self.nominal.given, self.nominal.cost);
         if !given.missing_values().is_empty() {
             return None;
         }
         let problem = self.nominal.problem(given, self.nominal.held)?;
-        let scaled = problem.pack(&given.values(), &self.nominal.solution.states);
-        let cost = problem.residual_vector(&scaled).ok()?.norm_squared();
+        let states = &self.nominal.solution.states;
+        let scaled = problem.pack(&given.values(), states);
+        let there = problem.residual_vector(&scaled).ok()?.norm_squared();
         let same = self.work.criteria().choice.never_same;
-        Some(cost.is_nan() || cost > same.powi(2) * self.nominal.cost)
+        if there <= same.powi(2) * cost {
+            return Some(false);
+        }
+        let (seen, unseen) = (cost.sqrt(), nrmse(self.nominal.rank));
+        let leads_there = |after: f64| seen <= same * after.sqrt() && after.sqrt() <= same * seen;
+        let promise = problem.promise(&given.values(), states).ok()?;
+        let is_one = unseen <= same * seen && promise.is_some_and(|(_, after)| leads_there(after));
+        Some(!is_one)
     }
 
     /// The best of those that were looked at, fitted until they converge.
