@@ -1,5 +1,7 @@
 //! Comparing a model with measurements: free run and one-step prediction.
 
+use std::borrow::Cow;
+
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_model::simulate::{Simulator, try_follow};
@@ -10,7 +12,7 @@ use serde::Serialize;
 use crate::error::CompareError;
 use crate::measurements::Measurements;
 use crate::observer::{Correction, attach_observer};
-use crate::prediction::{InitialStates, Solution, one_step};
+use crate::prediction::{InitialStates, Solution, for_each_run, one_step, predict};
 use crate::progress::{Stage, Work};
 use crate::score::{SignalScore, Tally, overall};
 use crate::where_it_fails::{Statement, where_it_fails};
@@ -98,33 +100,18 @@ pub fn compare(
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<Comparison, CompareError> {
-    let Measurements { runs, faults, .. } = *measurements;
-    with_values(model)?;
-    if model.measured.is_empty() {
-        return Err(CompareError::NothingMeasured);
-    }
-    measurements.check(model)?;
-    if runs.iter().all(Run::is_empty) {
-        return Err(CompareError::NoSamples);
-    }
-    let values = model.values();
-    work.tell(Stage::Comparing, 0, runs.len() as u64);
-    let runs = attach_observer(model, &values, runs, work)?;
-    let initial = InitialStates::estimate(model, &values, &runs, work)?;
+    let faults = measurements.faults;
+    work.tell(Stage::Comparing, 0, measurements.runs.len() as u64);
+    let (runs, solution) = started(model, measurements, work)?;
+    let Solution { values, states } = &solution;
     let mut tallies = vec![Tally::default(); model.measured.len()];
     let mut traces = Vec::with_capacity(runs.len());
-    for (run, x0) in runs.iter().zip(&initial.states) {
-        traces.push(trace(model, &values, run, x0, &mut tallies, work)?);
+    for (run, x0) in runs.iter().zip(states) {
+        traces.push(trace(model, values, run, x0, &mut tallies, work)?);
         work.tell(Stage::Comparing, traces.len() as u64, runs.len() as u64);
     }
-    let signals: Vec<SignalScore> = tallies
-        .iter()
-        .zip(&model.measured)
-        .map(|(tally, m)| tally.score(m.signal.id, m.signal.unit))
-        .collect();
+    let signals = scores(model, &tallies);
     let nrmse = overall(&signals);
-    let states = initial.states;
-    let solution = Solution { values, states };
     Ok(Comparison {
         nrmse,
         fit_percent: 100.0 * (1.0 - nrmse),
@@ -134,6 +121,71 @@ pub fn compare(
         where_it_fails: where_it_fails(model, &solution, &runs, work)?,
         runs: traces,
     })
+}
+
+/// The error that [`compare`] finds, and nothing else of it.
+///
+/// # Errors
+///
+/// As [`compare`].
+pub(crate) fn free_run_error(
+    model: &Model,
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<f64, CompareError> {
+    let (runs, Solution { values, states }) = started(model, measurements, work)?;
+    let predicted = for_each_run(&runs, &states, |run, x0| {
+        predict(model, &values, x0, run, work)
+    })?;
+    let width = model.measured.len();
+    let mut tallies = vec![Tally::default(); width];
+    for (run, predicted) in runs.iter().zip(&predicted) {
+        if let Some(row) = predicted.iter().position(|v| !v.is_finite()) {
+            return Err(diverged(run, row / width));
+        }
+        for (measured, predicted) in run.measured().chunks(width).zip(predicted.chunks(width)) {
+            for (tally, (y, p)) in tallies.iter_mut().zip(measured.iter().zip(predicted)) {
+                tally.add(*y, *p);
+            }
+        }
+    }
+    Ok(overall(&scores(model, &tallies)))
+}
+
+/// The runs as they are compared with the values of `model`, and these with their initial states.
+fn started<'a>(
+    model: &Model,
+    measurements: &Measurements<'a>,
+    work: &Work<'_>,
+) -> Result<(Cow<'a, [Run]>, Solution), CompareError> {
+    with_values(model)?;
+    if model.measured.is_empty() {
+        return Err(CompareError::NothingMeasured);
+    }
+    measurements.check(model)?;
+    if measurements.runs.iter().all(Run::is_empty) {
+        return Err(CompareError::NoSamples);
+    }
+    let values = model.values();
+    let runs = attach_observer(model, &values, measurements.runs, work)?;
+    let states = InitialStates::estimate(model, &values, &runs, work)?.states;
+    Ok((runs, Solution { values, states }))
+}
+
+/// The scores of the measured signals.
+fn scores(model: &Model, tallies: &[Tally]) -> Vec<SignalScore> {
+    let signals = tallies.iter().zip(&model.measured);
+    signals
+        .map(|(tally, m)| tally.score(m.signal.id, m.signal.unit))
+        .collect()
+}
+
+/// The free run over `run` diverges, at the latest at sample `k`.
+fn diverged(run: &Run, k: usize) -> CompareError {
+    CompareError::Diverged {
+        run: run.name().to_owned(),
+        time: run.time()[k],
+    }
 }
 
 /// Whether every parameter has a value.
@@ -169,21 +221,18 @@ fn trace(
         })
         .collect();
     let mut simulator = Simulator::new(model, values);
-    let mut diverged = None;
+    let mut first_lost = None;
     try_follow(&mut simulator, x0.as_slice(), run, |k, predicted, _| {
         for (signal, value) in signals.iter_mut().zip(predicted) {
             signal.free_run.push(*value);
         }
-        if diverged.is_none() && predicted.iter().any(|v| !v.is_finite()) {
-            diverged = Some(run.time()[k]);
+        if first_lost.is_none() && predicted.iter().any(|v| !v.is_finite()) {
+            first_lost = Some(k);
         }
         work.go_on()
     })?;
-    if let Some(time) = diverged {
-        return Err(CompareError::Diverged {
-            run: run.name().to_owned(),
-            time,
-        });
+    if let Some(k) = first_lost {
+        return Err(diverged(run, k));
     }
     one_step(model, values, run, x0.as_slice(), work, |k, predicted| {
         for (signal, value) in signals.iter_mut().zip(predicted) {

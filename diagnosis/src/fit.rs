@@ -3,7 +3,7 @@
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 
-use crate::compare::compare;
+use crate::compare::{compare, free_run_error};
 use crate::error::{CompareError, FitError};
 use crate::fitted::Fit;
 use crate::measurements::Measurements;
@@ -32,8 +32,8 @@ pub fn fit(
         test: None,
         ..*measurements
     };
-    let before = match compare(model, &fitted_to, &work.silently()) {
-        Ok(comparison) => Some(comparison.nrmse),
+    let before = match free_run_error(model, &fitted_to, &work.silently()) {
+        Ok(error) => Some(error),
         Err(CompareError::Cancelled(cancelled)) => return Err(cancelled.into()),
         Err(_) => None,
     };

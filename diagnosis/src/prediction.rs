@@ -300,53 +300,64 @@ impl InitialStates {
         runs: &[Run],
         work: &Work<'_>,
     ) -> Result<Self, Cancelled> {
-        let mut initial = Self::guess(model, values, runs);
+        let guessed = Self::guess(model, values, runs).states;
         let visible = estimated_states(model, values, runs);
-        let own: Vec<usize> = model.per_run().collect();
-        let iterations = if own.is_empty() { 3 } else { ITERATIONS_OWN };
-        for (run, x0) in runs.iter().zip(&mut initial.states) {
-            if run.len() < 2 {
-                continue;
-            }
+        let states = for_each_run(runs, &guessed, |run, x0| {
             let beginning = match run.len() {
-                0..=ENOUGH => Cow::Borrowed(run),
+                0..2 => return Ok(DVector::from_column_slice(x0)),
+                2..=ENOUGH => Cow::Borrowed(run),
                 _ => Cow::Owned(run.part(0..ENOUGH)),
             };
-            let run = &*beginning;
-            let cost = |x: &DVector<f64>| {
-                predict(model, values, x.as_slice(), run, work).map(|p| squares(&p, run))
+            Self::of_run(model, values, &beginning, x0, &visible, work)
+        })?;
+        Ok(Self { states })
+    }
+
+    /// That of one run, from `x0`.
+    fn of_run(
+        model: &Model,
+        values: &[f64],
+        run: &Run,
+        x0: &[f64],
+        visible: &[usize],
+        work: &Work<'_>,
+    ) -> Result<DVector<f64>, Cancelled> {
+        let own: Vec<usize> = model.per_run().collect();
+        let iterations = if own.is_empty() { 3 } else { ITERATIONS_OWN };
+        let cost = |x: &DVector<f64>| {
+            predict(model, values, x.as_slice(), run, work).map(|p| squares(&p, run))
+        };
+        let by = By {
+            parameters: &[],
+            states: visible,
+        };
+        let mut found = DVector::from_column_slice(x0);
+        let mut best = cost(&found)?;
+        for _ in 0..iterations {
+            let s = sensitivities(model, values, found.as_slice(), run, by, work)?;
+            let residual = residuals(&s.predicted, run);
+            let Some(step) = least_squares(&s.jacobian, &residual) else {
+                break;
             };
-            let mut best = cost(x0)?;
-            for _ in 0..iterations {
-                let by = By {
-                    parameters: &[],
-                    states: &visible,
-                };
-                let s = sensitivities(model, values, x0.as_slice(), run, by, work)?;
-                let residual = residuals(&s.predicted, run);
-                let Some(step) = least_squares(&s.jacobian, &residual) else {
-                    break;
-                };
-                let mut candidate = x0.clone();
-                for (k, state) in visible.iter().enumerate() {
-                    candidate[*state] += step[k];
-                }
-                for (value, i) in candidate.iter_mut().skip(model.n_states()).zip(&own) {
-                    *value = model.parameters[*i].declaration.nearest(*value);
-                }
-                let after = cost(&candidate)?;
-                if after >= best || after.is_nan() {
-                    break;
-                }
-                let done = best - after <= 1e-12 * best;
-                best = after;
-                *x0 = candidate;
-                if done {
-                    break;
-                }
+            let mut candidate = found.clone();
+            for (k, state) in visible.iter().enumerate() {
+                candidate[*state] += step[k];
+            }
+            for (value, i) in candidate.iter_mut().skip(model.n_states()).zip(&own) {
+                *value = model.parameters[*i].declaration.nearest(*value);
+            }
+            let after = cost(&candidate)?;
+            if after >= best || after.is_nan() {
+                break;
+            }
+            let done = best - after <= 1e-12 * best;
+            best = after;
+            found = candidate;
+            if done {
+                break;
             }
         }
-        Ok(initial)
+        Ok(found)
     }
 }
 

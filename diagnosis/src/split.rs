@@ -6,7 +6,7 @@
 use loopsight_model::model::Model;
 use loopsight_model::registry;
 
-use crate::compare::compare;
+use crate::compare::free_run_error;
 use crate::effect_at::EffectAt;
 use crate::error::FitError;
 use crate::improvement::ImprovementStep;
@@ -117,7 +117,7 @@ fn divide(
         && let Ok((error, fitted)) = refitted(&alone, best.measurements, &silent)
     {
         let runs = Measurements::new(best.measurements.runs);
-        first.nrmse_fit = compare(&fitted, &runs, &silent)?.nrmse;
+        first.nrmse_fit = free_run_error(&fitted, &runs, &silent)?;
         first.nrmse_test = error;
     }
     steps.splice(index..=index, [first, second]);
