@@ -26,11 +26,14 @@ pub(crate) fn discovered(
         look(&candidate, &start, nominal, f64::INFINITY)
     });
     let (looked, _) = looked.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let (mut judged, mut fit) = finish(looked, nominal)?;
+    let (mut judged, mut fit) = finish(looked, nominal, f64::INFINITY)?;
     // There is one candidate, and it is far from the model alone: it has the time to arrive.
     let further = nominal.work.criteria().start.further;
     for _ in 0..PASSES {
-        let (before, again) = (judged.error(), finish(judged.clone(), nominal));
+        let (before, again) = (
+            judged.error(),
+            finish(judged.clone(), nominal, f64::INFINITY),
+        );
         match again.filter(|(again, _)| again.error() < further * before) {
             Some(better) => (judged, fit) = better,
             None => break,

@@ -161,6 +161,14 @@ impl Search<'_> {
         self.is_explained(least) && error.powi(2) > self.beside(plain.powi(2), least.powi(2))
     }
 
+    /// The cost that a full fit must promise from where the short one ended, where of these the best leaves the error `least`. A
+    /// cost is a share of the plain model's as the square of an error is.
+    pub(crate) fn most_promised(&self, least: f64) -> f64 {
+        let plain = self.nominal.cost;
+        let left = (least / nrmse(self.nominal.rank)).powi(2);
+        self.beside(plain, plain * left)
+    }
+
     /// The root of the cost that a short fit must come below, with what those `looked` at came to.
     fn worth(&self, looked: &Looked) -> f64 {
         let behind = self.criteria().behind * looked.least;

@@ -114,10 +114,14 @@ impl Search<'_> {
         let of = contest.len() as u64;
         let done = AtomicU64::new(0);
         self.work.tell(Stage::Finalists, 0, of);
+        let most = self.most_promised(least(contest.iter()));
         let mut finalists: Vec<(Judged, Explanation)> = contest
             .par_iter()
-            .filter_map(|first| {
-                let found = self.finished(first.clone());
+            .enumerate()
+            .filter_map(|(k, first)| {
+                let spared = k >= self.criteria().finalists_at_least;
+                let most = if spared { most } else { f64::INFINITY };
+                let found = self.finished(first.clone(), most);
                 if let Some((_, explanation)) = &found {
                     self.work.know(|| Finding::Finalist(explanation.into()));
                 }
@@ -143,11 +147,11 @@ impl Search<'_> {
         &self.work.criteria().search
     }
 
-    /// The full fit of a candidate. An effect whose fitted size is nothing explains nothing, whatever the other
+    /// The full fit of a candidate, where that promises a cost of at most `most`. An effect whose fitted size is nothing explains nothing, whatever the other
     /// parameters gained; nor does a shift in time that the stamps may have of their own, nor directions that are alike, nor
     /// what is a simpler effect for all that the log shows.
-    fn finished(&self, first: Judged) -> Option<(Judged, Explanation)> {
-        let (judged, fit) = finish(first, self.nominal)?;
+    fn finished(&self, first: Judged, most: f64) -> Option<(Judged, Explanation)> {
+        let (judged, fit) = finish(first, self.nominal, most)?;
         let explanation = explain(&judged, &fit, self.nominal).ok()?;
         let criteria = self.work.criteria();
         let stands_in = is_the_same_both_ways(&judged.candidate, &explanation, criteria);
@@ -183,7 +187,7 @@ impl Search<'_> {
                 look(&candidate.chosen(start), start, self.nominal, f64::INFINITY)
             });
             let (first, _) = looks.min_by(|(a, _), (b, _)| a.error().total_cmp(&b.error()))?;
-            let found = self.finished(first)?;
+            let found = self.finished(first, f64::INFINITY)?;
             (found.0.error() <= near(candidate)).then_some(found)
         };
         (self.all.par_iter().filter(missed))

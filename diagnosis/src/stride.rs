@@ -16,7 +16,12 @@ impl Problem<'_> {
         values: &[f64],
         states: &[DVector<f64>],
     ) -> Result<Option<(f64, f64)>, Cancelled> {
-        let (residual, jacobian) = self.linearise(&self.pack(values, states))?;
+        self.promise_at(&self.pack(values, states))
+    }
+
+    /// The same at scaled unknowns.
+    pub(crate) fn promise_at(&self, at: &DVector<f64>) -> Result<Option<(f64, f64)>, Cancelled> {
+        let (residual, jacobian) = self.linearise(at)?;
         let gram = jacobian.tr_mul(&jacobian);
         let right = jacobian.tr_mul(&residual);
         let Some(inverse) = pseudo_inverse(&gram) else {

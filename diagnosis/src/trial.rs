@@ -167,8 +167,8 @@ pub(crate) fn look(
 /// The full fit of a finalist, initial states included, with intervals. A sign is as sharp as the integrator
 /// allows. Where a softer one does better, its width is fitted as well.
 ///
-/// None where every fit fails or the work was cancelled.
-pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
+/// None where every fit fails, where none promises a cost of at most `most`, or where the work was cancelled.
+pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>, most: f64) -> Option<(Judged, Fit)> {
     // With the sharpest sign possible.
     let criteria = nominal.criteria();
     let widths = [criteria.sharpest, criteria.sharp];
@@ -178,10 +178,10 @@ pub(crate) fn finish(first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fi
                 candidate: first.candidate.smoothed(*share)?,
                 ..first.clone()
             };
-            fully(sharp, nominal, criteria.wild)
+            fully(sharp, nominal, criteria.wild, most)
         })
     };
-    let broad = || fully(first.clone(), nominal, f64::INFINITY);
+    let broad = || fully(first.clone(), nominal, f64::INFINITY, most);
     let (sharp, broad) = rayon::join(sharp, broad);
     let error = |found: &(Judged, Fit)| found.0.error();
     let of = |found: &Option<(Judged, Fit)>| found.as_ref().map_or(f64::INFINITY, error);
@@ -211,7 +211,7 @@ fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     for i in &widths {
         first.candidate.model.parameters[*i].free = true;
     }
-    let (mut judged, mut fit) = fully(first, nominal, nominal.criteria().wild)?;
+    let (mut judged, mut fit) = fully(first, nominal, nominal.criteria().wild, f64::INFINITY)?;
     // From here on the widths are known parameters, as others are.
     for model in [&mut judged.candidate.model, &mut fit.model] {
         for i in &widths {
@@ -223,9 +223,9 @@ fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
     Some((judged, fit))
 }
 
-/// The full fit, without limits that nothing came to. None where its derivatives exceed `wild`, or where the effect only
-/// sharpens a sign.
-fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit)> {
+/// The full fit, without limits that nothing came to. None where its derivatives exceed `wild`, where the cost that it
+/// promises exceeds `most`, or where the effect only sharpens a sign.
+fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64, most: f64) -> Option<(Judged, Fit)> {
     let model = &first.candidate.model;
     let mut problem = nominal.problem(model, None)?;
     let start = problem.pack(&first.solution.values, &nominal.solution.states);
@@ -233,6 +233,9 @@ fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit
         return None;
     }
     let start = problem.balance(start).ok()?;
+    if (problem.promise_at(&start).ok()?).is_some_and(|(_, after)| after > most) {
+        return None;
+    }
     let mut found = problem.solve(&start, FINAL).ok()?;
     if problem.reweigh_starts(&found).ok()? {
         found = problem.solve(&found, AGAIN).ok()?;
@@ -252,7 +255,7 @@ fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64) -> Option<(Judged, Fit
             solution,
             ..first
         };
-        return fully(again, nominal, wild);
+        return fully(again, nominal, wild, f64::INFINITY);
     }
     let judged = Judged::of(first.candidate.clone(), model, solution, nominal)?;
     Some((judged, fit))
