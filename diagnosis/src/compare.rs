@@ -13,7 +13,7 @@ use crate::error::CompareError;
 use crate::measurements::Measurements;
 use crate::observer::{Correction, attach_observer};
 use crate::prediction::{InitialStates, Solution, for_each_run, one_step, predict};
-use crate::progress::{Stage, Work};
+use crate::progress::{Cancelled, Stage, Work};
 use crate::score::{SignalScore, Tally, overall};
 use crate::where_it_fails::{Statement, where_it_fails};
 
@@ -100,9 +100,10 @@ pub fn compare(
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<Comparison, CompareError> {
-    let faults = measurements.faults;
-    work.tell(Stage::Comparing, 0, measurements.runs.len() as u64);
-    let (runs, solution) = started(model, measurements, work)?;
+    let Measurements { runs, faults, .. } = *measurements;
+    check(model, measurements)?;
+    work.tell(Stage::Comparing, 0, runs.len() as u64);
+    let (runs, solution) = started(model, runs, work)?;
     let Solution { values, states } = &solution;
     let mut tallies = vec![Tally::default(); model.measured.len()];
     let mut traces = Vec::with_capacity(runs.len());
@@ -133,7 +134,8 @@ pub(crate) fn free_run_error(
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<f64, CompareError> {
-    let (runs, Solution { values, states }) = started(model, measurements, work)?;
+    check(model, measurements)?;
+    let (runs, Solution { values, states }) = started(model, measurements.runs, work)?;
     let predicted = for_each_run(&runs, &states, |run, x0| {
         predict(model, &values, x0, run, work)
     })?;
@@ -152,12 +154,8 @@ pub(crate) fn free_run_error(
     Ok(overall(&scores(model, &tallies)))
 }
 
-/// The runs as they are compared with the values of `model`, and these with their initial states.
-fn started<'a>(
-    model: &Model,
-    measurements: &Measurements<'a>,
-    work: &Work<'_>,
-) -> Result<(Cow<'a, [Run]>, Solution), CompareError> {
+/// Whether there is something to compare.
+fn check(model: &Model, measurements: &Measurements<'_>) -> Result<(), CompareError> {
     with_values(model)?;
     if model.measured.is_empty() {
         return Err(CompareError::NothingMeasured);
@@ -166,8 +164,17 @@ fn started<'a>(
     if measurements.runs.iter().all(Run::is_empty) {
         return Err(CompareError::NoSamples);
     }
+    Ok(())
+}
+
+/// The `runs` as they are compared with the values of `model`, and these with the initial states.
+fn started<'a>(
+    model: &Model,
+    runs: &'a [Run],
+    work: &Work<'_>,
+) -> Result<(Cow<'a, [Run]>, Solution), Cancelled> {
     let values = model.values();
-    let runs = attach_observer(model, &values, measurements.runs, work)?;
+    let runs = attach_observer(model, &values, runs, work)?;
     let states = InitialStates::estimate(model, &values, &runs, work)?.states;
     Ok((runs, Solution { values, states }))
 }

@@ -147,9 +147,9 @@ impl Search<'_> {
         &self.work.criteria().search
     }
 
-    /// The full fit of a candidate, where that promises a cost of at most `most`. An effect whose fitted size is nothing explains nothing, whatever the other
-    /// parameters gained; nor does a shift in time that the stamps may have of their own, nor directions that are alike, nor
-    /// what is a simpler effect for all that the log shows.
+    /// The full fit of a candidate, where that promises a cost of at most `most`. An effect whose fitted size is nothing
+    /// explains nothing, whatever the other parameters gained; nor does a shift in time that the stamps may have of their
+    /// own, nor directions that are alike, nor what is a simpler effect for all that the log shows.
     fn finished(&self, first: Judged, most: f64) -> Option<(Judged, Explanation)> {
         let (judged, fit) = finish(first, self.nominal, most)?;
         let explanation = explain(&judged, &fit, self.nominal).ok()?;

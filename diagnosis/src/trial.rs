@@ -233,8 +233,11 @@ fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64, most: f64) -> Option<(
         return None;
     }
     let start = problem.balance(start).ok()?;
-    if (problem.promise_at(&start).ok()?).is_some_and(|(_, after)| after > most) {
-        return None;
+    if most < f64::INFINITY {
+        let promise = problem.promise_at(&start).ok()?;
+        if promise.is_some_and(|(_, after)| after > most) {
+            return None;
+        }
     }
     let mut found = problem.solve(&start, FINAL).ok()?;
     if problem.reweigh_starts(&found).ok()? {
