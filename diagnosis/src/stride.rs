@@ -3,6 +3,7 @@
 use loopsight_model::model::pseudo_inverse;
 use nalgebra::DVector;
 
+use crate::gram::gram;
 use crate::problem::Problem;
 use crate::progress::Cancelled;
 
@@ -22,7 +23,7 @@ impl Problem<'_> {
     /// The same at scaled unknowns.
     pub(crate) fn promise_at(&self, at: &DVector<f64>) -> Result<Option<(f64, f64)>, Cancelled> {
         let (residual, jacobian) = self.linearise(at)?;
-        let gram = jacobian.tr_mul(&jacobian);
+        let gram = gram(&jacobian);
         let right = jacobian.tr_mul(&residual);
         let Some(inverse) = pseudo_inverse(&gram) else {
             return Ok(None);
