@@ -8,6 +8,7 @@ use loopsight_model::run::{Rows, Run};
 use loopsight_model::simulate::{Simulator, StateObserver};
 use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::floor;
@@ -213,18 +214,16 @@ impl<'a> Design<'a> {
 
     /// The linearisations along the first samples of each run, without those where they diverge.
     fn paths(&self, runs: &[Run], work: &Work<'_>) -> Result<Vec<Path>, Cancelled> {
-        let mut paths = Vec::new();
-        for run in runs {
+        let certain = self.certain(1.0);
+        let path = |run: &Run| {
             let n = run.len().min(LOOKED_AT);
             let fade = FIRST * run.median_period();
             let mut path = Path::new(&run.time()[..n]);
-            let certain = self.certain(1.0);
             let followed = self.filter(run, n, fade, &certain, work, |step| path.push(step))?;
-            if followed.is_some() {
-                paths.push(path);
-            }
-        }
-        Ok(paths)
+            Ok(followed.map(|_| path))
+        };
+        let paths: Result<Vec<_>, _> = runs.par_iter().map(path).collect();
+        Ok(paths?.into_iter().flatten().collect())
     }
 
     /// None where the filter diverges.

@@ -151,9 +151,11 @@ impl Plant for Ddmr {
         let [k_a, k_b, k_c, k_d, k_e, k_f, _, _] = *p;
         let right = u[0] + w[0];
         let left = u[1] + w[1];
+        // What does not depend on the state is a sum of its own: a step waits for no more of it than it must.
+        let (along, around) = (k_c * (right + left) + w[2], k_f * (right - left) + w[3]);
         [
-            k_a * v + k_b * omega * omega + k_c * (right + left) + w[2],
-            k_d * omega + k_e * v * omega + k_f * (right - left) + w[3],
+            k_a * v + k_b * omega * omega + along,
+            k_d * omega + k_e * v * omega + around,
             omega,
             v,
             S::zero(),
