@@ -221,6 +221,8 @@ pub(crate) struct Seen<'a> {
     pub(crate) ends: &'a [Ends],
     /// An observer corrects the free runs.
     pub(crate) observed: bool,
+    /// The `runs` are windows of one.
+    pub(crate) parts_of_one: bool,
 }
 
 /// All candidates for `model`: each effect at every single channel it fits, and at all channels of a
@@ -240,6 +242,7 @@ pub(crate) fn candidates(
         rms,
         ends,
         observed,
+        ..
     } = *seen;
     let sign_width = criteria.sign_width;
     let largest = largest_inputs(model, runs);
@@ -354,6 +357,7 @@ mod tests {
             rms: &rms,
             ends: &[],
             observed: false,
+            parts_of_one: false,
         };
         candidates(&robot, &seen, &SearchCriteria::DEFAULT)
     }

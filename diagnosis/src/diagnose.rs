@@ -188,7 +188,7 @@ fn steps(
     diagnosis.where_it_fails = where_it_fails(&plain.model, &plain.solution, runs, work)?;
     let finalists = match aim.discover {
         Discover::Only => Vec::new(),
-        Discover::Never | Discover::Last => search(diagnosis, &nominal, work)?,
+        Discover::Never | Discover::Last => search(diagnosis, &nominal, read.parts_of_one(), work)?,
     };
     let Some(first) = read.first() else {
         let unseen = &plain.judgement.losses;
@@ -332,10 +332,12 @@ fn solve_plain(
     Ok((plain, fitted))
 }
 
-/// The candidates that explain most, fitted. The diagnosis lists them, the best first.
+/// The candidates that explain most, fitted. The diagnosis lists them, the best first. What the search reads may be
+/// windows, `parts_of_one` run.
 fn search(
     diagnosis: &mut Diagnosis,
     nominal: &Nominal<'_>,
+    parts_of_one: bool,
     work: &Work<'_>,
 ) -> Result<Vec<Judged>, Cancelled> {
     let rms = signal_rms(
@@ -357,6 +359,7 @@ fn search(
         rms: &rms,
         ends: &ends,
         observed: diagnosis.observer.is_some(),
+        parts_of_one,
     };
     let criteria = &work.criteria().search;
     let all = candidates(nominal.model, &seen, criteria);

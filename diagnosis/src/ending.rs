@@ -50,6 +50,11 @@ impl<'a> Read<'a> {
         Some(windows.unwrap_or(test))
     }
 
+    /// Whether these are windows of one run.
+    pub(crate) fn parts_of_one(&self) -> bool {
+        self.runs.is_some() && self.all.runs.len() == 1
+    }
+
     /// By run of the measurements: the one that the search read and that begins where it does. None where the
     /// search reads everything.
     pub(crate) fn first(&self) -> Option<Vec<usize>> {

@@ -48,10 +48,12 @@ fn masses(model: &Model) -> usize {
 }
 
 /// What a recording lacks in which an effect [cannot show](can_show); none where it is not the recording that lacks it.
+/// The `runs` may be windows, `parts_of_one`.
 pub(crate) fn what_is_absent(
     meta: &EffectMeta,
     model: &Model,
     runs: &[Run],
+    parts_of_one: bool,
 ) -> Option<&'static str> {
     Some(match meta.shows {
         // That is a matter of the plant.
@@ -62,6 +64,9 @@ pub(crate) fn what_is_absent(
             "no input goes both ways"
         }
         Shows::NeverNegative => "what is measured goes below zero",
+        Shows::OneRun if parts_of_one => {
+            "a log this long is searched in windows; a shorter part can show it"
+        }
         Shows::OneRun => "the recording has several runs",
         Shows::AtEnd => "nothing stays at an end of where it goes",
         Shows::InputSizes => "the commands all have one size",

@@ -56,7 +56,7 @@ fn why(
     if sets.iter().any(shows) {
         return None;
     }
-    what_is_absent(meta, model, seen.runs).map(str::to_owned)
+    what_is_absent(meta, model, seen.runs, seen.parts_of_one).map(str::to_owned)
 }
 
 #[cfg(test)]
@@ -70,6 +70,10 @@ mod tests {
 
     /// The effects that are not tried on runs with these commands, and why.
     fn of(model: &str, runs: &[&[f64]]) -> Vec<(String, String)> {
+        seen_as(model, runs, false)
+    }
+
+    fn seen_as(model: &str, runs: &[&[f64]], parts_of_one: bool) -> Vec<(String, String)> {
         let (model, _) = Model::from_toml("axis.toml", model).unwrap();
         let runs: Vec<Run> = runs
             .iter()
@@ -87,6 +91,7 @@ mod tests {
             rms: &[],
             ends: &[],
             observed: false,
+            parts_of_one,
         };
         let all = untried(&model, &seen, &SearchCriteria::DEFAULT);
         all.into_iter().map(|u| (u.effect, u.why)).collect()
@@ -110,6 +115,9 @@ mod tests {
         let several = of(AXIS, &[&[3.0, 0.0, -3.0], &[3.0]]);
         let runs = "the recording has several runs";
         assert_eq!(why_of(&several, "gain_drift"), Some(runs));
+        let windows = seen_as(AXIS, &[&[3.0, 0.0, -3.0], &[3.0]], true);
+        let long = "a log this long is searched in windows; a shorter part can show it";
+        assert_eq!(why_of(&windows, "gain_drift"), Some(long));
         assert_eq!(why_of(&several, "bridge_coast"), None);
     }
 

@@ -262,6 +262,13 @@ impl TomlSource {
             let message = format!("the key {missing} is missing here");
             return self.error(&path, &message, None);
         }
+        if message == "invalid type: map, expected a sequence"
+            && let [PathSegment::Key(list)] = &*path
+        {
+            let message = format!("`{list}` is one table here, expected a list of them");
+            let help = format!("begin each of them with a line `[[{list}]]`");
+            return self.error(&path, &message, Some(help));
+        }
         self.error(&path, message, None)
     }
 }
@@ -376,6 +383,17 @@ mod tests {
         let error = source.read::<Thing>().unwrap_err();
         assert_eq!((error.line, error.column), (2, 14));
         assert!(error.message.contains("invalid type"), "{}", error.message);
+    }
+
+    #[test]
+    fn one_table_where_a_list_belongs_is_told_how_a_list_begins() {
+        let source = TomlSource::parse("m.toml", "mass = 1.0\n[list.first]\n").unwrap();
+        let error = source.read::<Thing>().unwrap_err();
+        assert_eq!((error.line, error.column), (2, 2));
+        let message = "`list` is one table here, expected a list of them";
+        assert_eq!(error.message, message);
+        let help = "begin each of them with a line `[[list]]`";
+        assert_eq!(error.help.as_deref(), Some(help));
     }
 
     #[test]
