@@ -13,7 +13,6 @@ use crate::{Array, Real};
 /// assert_eq!(substeps(0.0100000001, 0.0025), 4);
 /// assert_eq!(substeps(0.011, 0.0025), 5);
 /// ```
-#[inline]
 pub fn substeps(span: f64, longest: f64) -> usize {
     let ratio = span / longest;
     if !(ratio > 1.0 && ratio.is_finite()) {

@@ -368,7 +368,8 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         let h = span / steps as f64;
         let remember = remember && !self.bounds.output_memory.is_empty();
         if !remember && self.is_even() {
-            return self.evenly(input, start, h, steps);
+            self.apply(input, 0.0);
+            return self.step(start, h, steps);
         }
         for step in 0..steps {
             let elapsed = h * step as f64;

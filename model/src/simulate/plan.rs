@@ -17,13 +17,12 @@ pub(super) struct Plan {
 impl Plan {
     /// Of the effects of a model with so many states, beside which others may be integrated, `size` in all.
     pub(super) fn of(bounds: &Bounds, states: usize, size: usize) -> Self {
-        let beside = !bounds.inputs.is_empty() || !bounds.bodies.is_empty() || size > states;
         Self {
             inputs: Group::of(&bounds.inputs, states),
             efforts: Group::of(&bounds.efforts, states),
             bodies: Group::of(&bounds.bodies, states),
-            beside,
-            alone: !beside && bounds.efforts.is_empty(),
+            beside: !bounds.inputs.is_empty() || !bounds.bodies.is_empty() || size > states,
+            alone: bounds.efforts.is_empty(),
         }
     }
 }

@@ -21,35 +21,6 @@ impl<S: HostReal> Simulator<'_, S> {
             && self.slopes.iter().all(|slope| *slope == 0.0)
     }
 
-    /// An [even](Self::is_even) interval of `steps` of `h` seconds, with `input` applied from its start on.
-    pub(super) fn evenly(&mut self, input: &[f64], from: f64, h: f64, steps: usize) {
-        if !self.plan.alone || !self.pushed.rates.is_empty() {
-            self.apply(input, 0.0);
-            return self.step(from, h, steps);
-        }
-        self.fresh = false;
-        let held = self.scratch.held.iter_mut();
-        for ((held, value), push) in held.zip(input).zip(&self.pushed.inputs) {
-            *held = S::of(*value) + *push;
-        }
-        self.alone(h, steps);
-    }
-
-    /// `steps` of the plant itself, with the inputs in `held`.
-    fn alone(&mut self, h: f64, steps: usize) {
-        let span = Steps {
-            count: steps,
-            length: S::of(h),
-        };
-        let (u, w) = (&self.scratch.held, &self.pushed.efforts);
-        let dynamics = S::dynamics(self.model.dynamics);
-        if self.trail {
-            dynamics.steps(&mut self.x, span, u, w, &self.p);
-        } else {
-            dynamics.steps_of_motion(&mut self.x, span, u, w, &self.p);
-        }
-    }
-
     /// So many integration `steps` of `h` seconds, from the inputs in `held`; leaves those at their end there. More than
     /// one where the interval [is even](Self::is_even).
     pub(super) fn step(&mut self, from: f64, h: f64, steps: usize) {
@@ -103,10 +74,6 @@ impl<S: HostReal> Simulator<'_, S> {
         for (held, push) in scratch.held.iter_mut().zip(&pushed.inputs) {
             *held += *push;
         }
-        let explicit = *way == Way::Explicit && pushed.rates.is_empty() && !ramping;
-        if explicit && plan.alone {
-            return self.alone(h, steps);
-        }
         scratch.w.copy_from_slice(&pushed.efforts);
         let (nx, nu) = (model.n_states(), model.plant.inputs.len());
         let dynamics = S::dynamics(model.dynamics);
@@ -116,11 +83,19 @@ impl<S: HostReal> Simulator<'_, S> {
             w,
             signals,
         } = scratch;
-        if explicit && !plan.beside {
+        if *way == Way::Explicit && !plan.beside && pushed.rates.is_empty() && !ramping {
             let span = Steps {
                 count: steps,
                 length: S::of(h),
             };
+            if plan.alone {
+                if *trail {
+                    dynamics.steps(x, span, held, w, p);
+                } else {
+                    dynamics.steps_of_motion(x, span, held, w, p);
+                }
+                return;
+            }
             let under = Under {
                 span,
                 u: held,
