@@ -273,3 +273,90 @@ fn spares(other: &Candidate, candidate: &Candidate) -> bool {
         && other.at.len() > candidate.at.len();
     other.is_special(candidate) || alike || wider
 }
+
+#[cfg(test)]
+mod tests {
+    use loopsight_model::model::Model;
+    use loopsight_plants as _;
+
+    use super::*;
+    use crate::holdout::Holdout;
+    use crate::prediction::InitialStates;
+    use crate::problem::Problem;
+    use crate::solve::Effort;
+    use crate::swing::swing;
+
+    fn axis(values: &str, effect: &str) -> Model {
+        let text = format!("[plant.dc_axis]\n{values}\n[log.measured.speed]\n{effect}");
+        Model::from_toml("axis.toml", &text).unwrap().0
+    }
+
+    const FRICTION: &str = "[[effect]]\n[effect.coulomb_friction]\nat = [\"shaft\"]\nlevel = 0.8\n";
+
+    /// What `ask` says of a search that begins with `given`, on an axis with friction that the model lacks; the plain model
+    /// does `worse` by that factor where it is ranked.
+    fn search<T>(given: &Model, worse: f64, ask: impl Fn(&Search<'_>) -> T) -> T {
+        let machine = axis("K_A = -2.0\nK_C = 8.0", FRICTION);
+        let runs = [swing(&machine, 600)];
+        let work = Work::quiet();
+        let model = axis("K_A = -1.5\nK_C = 6.0", "");
+        let holdout = Holdout::new(&model, &runs, None, &work.criteria().holdout);
+        let states = InitialStates::guess(&model, &model.values(), &runs).states;
+        let seen = holdout.seen.as_deref();
+        let mut problem = Problem::with(&model, &runs, seen, None, Work::quiet()).unwrap();
+        let solution = problem
+            .solve_from(&model.values(), &states, Effort::FULL)
+            .unwrap();
+        let cost = problem.best().unwrap().0.powi(2);
+        let mut rank = holdout.judge(&model, &solution, &work).unwrap().rank;
+        rank.iter_mut().for_each(|loss| *loss *= worse.powi(2));
+        let nominal = Nominal {
+            given,
+            model: &model,
+            solution: &solution,
+            cost,
+            rank: &rank,
+            floor: 1e-6,
+            held: Some(&solution.states),
+            holdout: &holdout,
+            work: &work,
+        };
+        ask(&Search {
+            all: &[],
+            nominal: &nominal,
+            work: &work,
+            extent: Extent::of(&runs),
+            shift: 0.0,
+        })
+    }
+
+    #[test]
+    fn a_model_that_leads_to_the_plain_fit_is_not_elsewhere() {
+        let elsewhere = |given: &Model, worse| search(given, worse, |s| s.given_is_elsewhere());
+        // Near where the fit ends, and from where one step leads there.
+        for values in ["K_A = -2.6\nK_C = 8.5", "K_A = -1.5\nK_C = 6.0"] {
+            assert_eq!(elsewhere(&axis(values, ""), 1.0), Some(false), "{values}");
+        }
+        // The fit does worse on what it did not see, so it may be the one that went astray.
+        let far = axis("K_A = -1.5\nK_C = 6.0", "");
+        assert_eq!(elsewhere(&far, 4.0), Some(true));
+        // From four times the gain and a fiftieth of the damping one step leads elsewhere.
+        let further = axis("K_A = -0.04\nK_C = 32.0", "");
+        assert_eq!(elsewhere(&further, 1.0), Some(true));
+        // Where the file gives no values there is nowhere to begin a second time.
+        assert_eq!(elsewhere(&axis("", ""), 4.0), None);
+    }
+
+    /// A tenth of what the best one explains: of all of it, of none of it, and of three quarters.
+    #[test]
+    fn a_full_fit_must_promise_its_share_of_what_the_best_explains() {
+        let given = axis("K_A = -1.5\nK_C = 6.0", "");
+        search(&given, 1.0, |search| {
+            let (plain, error) = (search.nominal.cost, nrmse(search.nominal.rank));
+            for (least, share) in [(0.0, 0.9), (error, 1.0), (0.5 * error, 0.925)] {
+                let most = search.most_promised(least) / plain;
+                assert!((most - share).abs() < 1e-12, "{least}: {most}");
+            }
+        });
+    }
+}
