@@ -291,6 +291,8 @@ mod tests {
         Model::from_toml("axis.toml", &text).unwrap().0
     }
 
+    /// The values that the plain model's fit begins with.
+    const START: &str = "K_A = -1.5\nK_C = 6.0";
     const FRICTION: &str = "[[effect]]\n[effect.coulomb_friction]\nat = [\"shaft\"]\nlevel = 0.8\n";
 
     /// What `ask` says of a search that begins with `given`, on an axis with friction that the model lacks; the plain model
@@ -299,7 +301,7 @@ mod tests {
         let machine = axis("K_A = -2.0\nK_C = 8.0", FRICTION);
         let runs = [swing(&machine, 600)];
         let work = Work::quiet();
-        let model = axis("K_A = -1.5\nK_C = 6.0", "");
+        let model = axis(START, "");
         let holdout = Holdout::new(&model, &runs, None, &work.criteria().holdout);
         let states = InitialStates::guess(&model, &model.values(), &runs).states;
         let seen = holdout.seen.as_deref();
@@ -334,12 +336,11 @@ mod tests {
     fn a_model_that_leads_to_the_plain_fit_is_not_elsewhere() {
         let elsewhere = |given: &Model, worse| search(given, worse, |s| s.given_is_elsewhere());
         // Near where the fit ends, and from where one step leads there.
-        for values in ["K_A = -2.6\nK_C = 8.5", "K_A = -1.5\nK_C = 6.0"] {
+        for values in ["K_A = -2.6\nK_C = 8.5", START] {
             assert_eq!(elsewhere(&axis(values, ""), 1.0), Some(false), "{values}");
         }
         // The fit does worse on what it did not see, so it may be the one that went astray.
-        let far = axis("K_A = -1.5\nK_C = 6.0", "");
-        assert_eq!(elsewhere(&far, 4.0), Some(true));
+        assert_eq!(elsewhere(&axis(START, ""), 4.0), Some(true));
         // From four times the gain and a fiftieth of the damping one step leads elsewhere.
         let further = axis("K_A = -0.04\nK_C = 32.0", "");
         assert_eq!(elsewhere(&further, 1.0), Some(true));
@@ -350,8 +351,7 @@ mod tests {
     /// A tenth of what the best one explains: of all of it, of none of it, and of three quarters.
     #[test]
     fn a_full_fit_must_promise_its_share_of_what_the_best_explains() {
-        let given = axis("K_A = -1.5\nK_C = 6.0", "");
-        search(&given, 1.0, |search| {
+        search(&axis(START, ""), 1.0, |search| {
             let (plain, error) = (search.nominal.cost, nrmse(search.nominal.rank));
             for (least, share) in [(0.0, 0.9), (error, 1.0), (0.5 * error, 0.925)] {
                 let most = search.most_promised(least) / plain;
