@@ -94,7 +94,7 @@ macro_rules! declare_effect {
         }
 
         impl<S: $crate::Real> $crate::Physics<S> for $effect {
-            #[inline]
+            #[inline(always)]
             fn contribution(&self, at: &$crate::Reading<'_, S>, z: &[S], p: &[S]) -> S {
                 let (Ok(z), Ok(p)) = (z.try_into(), p.try_into()) else {
                     return S::of(0.0);
