@@ -60,6 +60,9 @@ pub struct EffectMeta {
     pub before_input: bool,
     /// It is the law of the actuator's output: at its inputs it acts on what all other effects leave of the command.
     pub acts_last: bool,
+    /// A static map of its channel: what it adds follows from [`Reading::nominal`], [`Reading::side`] and the parameters
+    /// alone, not from time, a signal or a state. On an input that is held it is evaluated once per interval.
+    pub is_static: bool,
     /// What a recording must have for it to show.
     pub shows: Shows,
     /// How rare it is: 0 nearly every machine has it, 1 common, 2 rare. Orders explanations that a
@@ -97,6 +100,7 @@ impl EffectMeta {
         shared_only: false,
         before_input: false,
         acts_last: false,
+        is_static: false,
         shows: Shows::Anywhere,
         rarity: 1,
         simpler: &[],

@@ -29,6 +29,8 @@ pub(crate) struct Bound {
     pub(crate) history: Option<usize>,
     /// How far ahead it sees its channel, s.
     pub(crate) ahead: f64,
+    /// What it adds follows from the channel's value and its parameters alone.
+    pub(super) is_static: bool,
 }
 
 impl Bound {
@@ -90,6 +92,7 @@ impl Bounds {
                     n_z: effect.meta.states,
                     history,
                     ahead: effect.meta.ahead_s,
+                    is_static: effect.meta.is_static,
                 };
                 bounds.states += effect.meta.states;
                 match (channel.place, effect.meta.memory) {

@@ -83,6 +83,18 @@ impl<S: HostReal> Simulator<'_, S> {
             w,
             signals,
         } = scratch;
+        let changing = ramping || !plan.steady;
+        if !changing {
+            u.copy_from_slice(held);
+            let now = Now {
+                time: from,
+                signals,
+                z: &x[nx..],
+            };
+            for group in &plan.inputs {
+                group.act(&now, values, u, &mut []);
+            }
+        }
         if *way == Way::Explicit && !plan.beside && pushed.rates.is_empty() && !ramping {
             let span = Steps {
                 count: steps,
@@ -90,15 +102,15 @@ impl<S: HostReal> Simulator<'_, S> {
             };
             if plan.alone {
                 if *trail {
-                    dynamics.steps(x, span, held, w, p);
+                    dynamics.steps(x, span, u, w, p);
                 } else {
-                    dynamics.steps_of_motion(x, span, held, w, p);
+                    dynamics.steps_of_motion(x, span, u, w, p);
                 }
                 return;
             }
             let under = Under {
                 span,
-                u: held,
+                u,
                 w,
                 p,
                 states: &needed.states,
@@ -119,19 +131,15 @@ impl<S: HostReal> Simulator<'_, S> {
                 return;
             }
         }
-        let changing = ramping || !plan.inputs.is_empty();
         for step in 0..steps {
             let from = from + h * step as f64;
             let rates = |stage: usize, x: &[S], dx: &mut [S]| {
                 let time = from + h * PARTS[stage];
                 let (plant_x, z) = x.split_at(nx);
                 let (plant_dx, dz) = dx.split_at_mut(nx);
-                let u: &mut [S] = if changing {
+                if changing {
                     u.copy_from_slice(held);
-                    u
-                } else {
-                    held
-                };
+                }
                 if ramping {
                     ramped(u, bounds, slopes, time - from);
                 }
@@ -147,7 +155,7 @@ impl<S: HostReal> Simulator<'_, S> {
                     }
                 };
                 refresh(u, signals);
-                if !plan.inputs.is_empty() {
+                if changing && !plan.inputs.is_empty() {
                     let now = Now { time, signals, z };
                     for group in &plan.inputs {
                         group.act(&now, values, u, dz);

@@ -42,6 +42,7 @@ impl Effect for DeadZone {
                 .scaled(0.3),
         ],
         before_input: true,
+        is_static: true,
         ..EffectMeta::PLAIN
     };
 

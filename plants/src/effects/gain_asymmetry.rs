@@ -44,6 +44,7 @@ impl Effect for GainAsymmetry {
         .within(-1.0, 1.0)
         .or(0.0)
         .scaled(0.02)],
+        is_static: true,
         ..EffectMeta::PLAIN
     };
 

@@ -38,6 +38,7 @@ impl Effect for InputOffset {
                 .or(0.0)
                 .scaled(0.3),
         ],
+        is_static: true,
         ..EffectMeta::PLAIN
     };
 

@@ -65,6 +65,7 @@ impl Effect for InputPower {
         ],
         before_input: true,
         acts_last: true,
+        is_static: true,
         ..EffectMeta::PLAIN
     };
 

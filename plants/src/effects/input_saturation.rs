@@ -40,6 +40,7 @@ impl Effect for InputSaturation {
                 .starting_at(&[1.5, 3.0, 5.0, 8.0, 12.0, 20.0]),
         ],
         before_input: true,
+        is_static: true,
         ..EffectMeta::PLAIN
     };
 
