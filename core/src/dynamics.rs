@@ -110,7 +110,6 @@ pub fn steps_under<P, S>(
     under: &Under<'_, S>,
     signals: &mut [S],
     act: &mut Act<'_, S>,
-    outputs: impl Fn(&[usize], &P::State<S>, &P::Input<S>, &P::Parameters<S>, &mut [S]),
     rate: impl Fn(&P::State<S>, &P::Input<S>, &P::Effort<S>, &P::Parameters<S>) -> P::State<S>,
 ) -> bool
 where
@@ -137,7 +136,7 @@ where
                     *to = *from;
                 }
             }
-            outputs(under.outputs, x, u, p, &mut signals[nx + nu..]);
+            P::outputs(under.outputs, x, u, p, &mut signals[nx + nu..]);
             let mut w = *w;
             act((step, stage), signals, w.as_mut());
             rate(x, u, &w, p)
@@ -217,7 +216,6 @@ macro_rules! declare_plant {
                         under,
                         signals,
                         act,
-                        |i, x, u, p, y| $crate::Dynamics::outputs(self, i, x, u, p, y),
                         <$plant as $crate::Plant>::derivative::<S>,
                     )
                 } else {
@@ -226,7 +224,6 @@ macro_rules! declare_plant {
                         under,
                         signals,
                         act,
-                        |i, x, u, p, y| $crate::Dynamics::outputs(self, i, x, u, p, y),
                         <$plant as $crate::Plant>::motion::<S>,
                     )
                 }
@@ -278,6 +275,11 @@ macro_rules! declare_plant {
                     return S::of(0.0);
                 };
                 <$plant as $crate::Plant>::output::<S>(index, x, u, p)
+            }
+            fn outputs(&self, which: &[usize], x: &[S], u: &[S], p: &[S], y: &mut [S]) {
+                if let (Ok(x), Ok(u), Ok(p)) = (x.try_into(), u.try_into(), p.try_into()) {
+                    <$plant as $crate::Plant>::outputs::<S>(which, x, u, p, y);
+                }
             }
             fn lower(&self, set: usize, from: &[S], p: &mut [S]) {
                 if set == 0 {

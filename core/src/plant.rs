@@ -204,6 +204,23 @@ pub trait Plant: PlantArrays + Sized + Send + Sync + 'static {
         p: &Self::Parameters<S>,
     ) -> S;
 
+    /// Those of the outputs that `which` lists, each to its place in `y`, with the values of [`Plant::output`]. A plant
+    /// whose outputs have much in common computes that once here.
+    #[inline(always)]
+    fn outputs<S: Real>(
+        which: &[usize],
+        x: &Self::State<S>,
+        u: &Self::Input<S>,
+        p: &Self::Parameters<S>,
+        y: &mut [S],
+    ) {
+        for index in which {
+            if let Some(to) = y.get_mut(*index) {
+                *to = Self::output(*index, x, u, p);
+            }
+        }
+    }
+
     /// Parameters of the equations from those of [`PlantMeta::parameterizations`]`[set]`.
     ///
     /// `from` has the length of that set. `None` when the set does not exist.

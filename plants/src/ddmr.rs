@@ -185,6 +185,20 @@ impl Plant for Ddmr {
         }
     }
 
+    fn outputs<S: Real>(which: &[usize], x: &[S; 6], u: &[S; 2], p: &[S; 8], y: &mut [S]) {
+        let mut both = None;
+        for index in which {
+            let Some(to) = y.get_mut(*index) else {
+                continue;
+            };
+            *to = match index {
+                // The voltages over the two windings have their terms in common.
+                8 | 9 => both.get_or_insert_with(|| armature(x, u, p))[index - 8],
+                _ => Self::output(*index, x, u, p),
+            };
+        }
+    }
+
     fn derived<S: Real>(index: usize, p: &[S; 8]) -> S {
         let [k_a, _, k_c, ..] = *p;
         let two = S::of(2.0);
