@@ -72,6 +72,7 @@ mod driver;
 mod dynamics;
 mod effect;
 mod estimator;
+mod exp;
 mod integrator;
 pub mod learning;
 pub mod limits;

@@ -9,7 +9,7 @@ use num_traits::{One, Zero};
 /// A real number: `f32` on a microcontroller, `f64` on a desk, a dual number in a fit.
 ///
 /// Plants and effects are written once for any `Real`. The elementary functions come from `libm`
-/// for `f32` and `f64` alike (`tanh` is this crate's own), so a loop gives the same digits on
+/// for `f32` and `f64` alike (`tanh` and `exp` are this crate's own), so a loop gives the same digits on
 /// every machine.
 ///
 /// Comparisons look at the value only: a dual number compares by its real part, so a branch
@@ -154,7 +154,7 @@ impl Real for f64 {
         crate::tanh::tanh(self)
     }
     fn exp(self) -> Self {
-        libm::exp(self)
+        crate::exp::exp(self)
     }
     fn sqrt(self) -> Self {
         libm::sqrt(self)

@@ -206,7 +206,7 @@ impl<const N: usize> Real for DualOf<N> {
         self.chain(tanh, 1.0 - tanh * tanh)
     }
     fn exp(self) -> Self {
-        let exp = libm::exp(self.value);
+        let exp = Real::exp(self.value);
         self.chain(exp, exp)
     }
     fn sqrt(self) -> Self {
