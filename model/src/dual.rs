@@ -5,6 +5,7 @@ use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAss
 
 use num_traits::{One, Zero};
 
+use crate::registry::died_out;
 use loopsight_core::Real;
 
 /// Number of derivatives one [`Dual`] carries; a fit with more unknowns makes several passes. A
@@ -63,6 +64,15 @@ pub fn derivative<const N: usize>(dual: &DualOf<N>, index: usize) -> f64 {
 }
 
 impl<const N: usize> DualOf<N> {
+    /// Zero for what has [died out](died_out).
+    #[inline(always)]
+    pub(crate) fn settled(self) -> Self {
+        Self {
+            value: died_out(self.value),
+            slopes: self.slopes.map(died_out),
+        }
+    }
+
     /// `(value, slope · self')`: the chain rule.
     #[inline(always)]
     fn chain(self, value: f64, slope: f64) -> Self {

@@ -357,6 +357,9 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         } else {
             self.integrate(input, span, steps, true);
         }
+        for x in &mut self.x {
+            *x = x.settled();
+        }
         self.time = until;
         self.interval = span;
     }
