@@ -175,11 +175,13 @@ impl EffectTable {
         states::check_used(&self.states, &tree, &moved.rates, index_of)?;
         let mut read = Vec::new();
         let mut roles = Vec::new();
+        let mut timed = false;
         for tree in &trees {
             tree.for_each_name(&mut |slot| {
                 let index = usize::from(slot.index);
                 match slot.bank {
                     SIGNALS if !read.contains(&index) => read.push(index),
+                    HERE => timed |= HERE_NAMES.get(index) == Some(&"time"),
                     ROLES => roles.extend(Role::ALL.get(index).filter(|r| !roles.contains(*r))),
                     _ => {}
                 }
@@ -203,6 +205,7 @@ impl EffectTable {
             reference: "the model file",
             example: EFFECT_PART.example,
             places: &PlaceKind::ALL,
+            is_static: !timed && roles.is_empty() && read.is_empty() && self.states.is_empty(),
             reads: roles.leak(),
             parameters: parameters.leak(),
             states: self.states.len(),
