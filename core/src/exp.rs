@@ -17,7 +17,7 @@ const Q: [f64; 10] = [
 /// `ln 2` in two parts: the first with so few digits that 1024 times it is exact.
 const LN_2: [f64; 2] = [0.693_147_180_559_890_3, 5.497_923_018_708_371e-14];
 /// `1/ln 2`.
-const PER_LN_2: f64 = 1.442_695_040_888_963_4;
+const PER_LN_2: f64 = core::f64::consts::LOG2_E;
 /// Added to a number below 2⁵¹ it leaves the nearest whole number in the lowest bits.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 /// Up to here, in size, the result is a normal number.

@@ -10,7 +10,7 @@ pub trait HostReal: Real {
     fn dynamics(any: &'static dyn AnyDynamics) -> &'static dyn Dynamics<Self>;
     /// The effect for this scalar.
     fn physics(any: &'static dyn AnyPhysics) -> &'static dyn Physics<Self>;
-    /// The number with zero for a value and for derivatives that have [died out](died_out).
+    /// The number with zero for a value, and for each derivative, that is below 1.5e-154: its square is no normal number.
     fn settled(self) -> Self;
 }
 
