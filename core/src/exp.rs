@@ -1,5 +1,7 @@
 //! The exponential function in double precision.
 
+use crate::tanh::{BIAS, EXPONENT, WHOLE};
+
 /// `(e^r - 1 - r)/r²` by ascending powers of `r`.
 const Q: [f64; 10] = [
     0.500_000_000_000_000_1,
@@ -18,14 +20,8 @@ const Q: [f64; 10] = [
 const LN_2: [f64; 2] = [0.693_147_180_559_890_3, 5.497_923_018_708_371e-14];
 /// `1/ln 2`.
 const PER_LN_2: f64 = core::f64::consts::LOG2_E;
-/// Added to a number below 2⁵¹ it leaves the nearest whole number in the lowest bits.
-const WHOLE: f64 = 6_755_399_441_055_744.0;
 /// Up to here, in size, the result is a normal number.
 const NORMAL: f64 = 708.0;
-/// Where the exponent of a number begins.
-const EXPONENT: u32 = 52;
-/// The exponent of 1.
-const BIAS: u64 = 1023;
 
 /// `e^x` to one unit of the last digit.
 ///

@@ -9,8 +9,8 @@ use num_traits::{One, Zero};
 /// A real number: `f32` on a microcontroller, `f64` on a desk, a dual number in a fit.
 ///
 /// Plants and effects are written once for any `Real`. The elementary functions come from `libm`
-/// for `f32` and `f64` alike (`tanh` and `exp` are this crate's own), so a loop gives the same digits on
-/// every machine.
+/// for `f32` and `f64` alike (`tanh`, and `exp` in double precision, are this crate's own), so a loop
+/// gives the same digits on every machine.
 ///
 /// Comparisons look at the value only: a dual number compares by its real part, so a branch
 /// (a dead zone, say) takes the derivative of the side it is on.

@@ -73,13 +73,13 @@ const LATE: f64 = 1.1;
 /// Up to here `k` would be 0; `tanh x` is just above 1/2.
 const SMALL: f64 = 0.5545;
 /// Added to a number below 2⁵¹ it leaves the nearest whole number in the lowest bits.
-const WHOLE: f64 = 6_755_399_441_055_744.0;
+pub(crate) const WHOLE: f64 = 6_755_399_441_055_744.0;
 /// From here on `tanh x` is nearest to 1.
 const ONE_FROM: f64 = 19.1;
 /// Where the exponent of a number begins.
-const EXPONENT: u32 = 52;
+pub(crate) const EXPONENT: u32 = 52;
 /// The exponent of 1.
-const BIAS: u64 = 1023;
+pub(crate) const BIAS: u64 = 1023;
 
 /// `tanh x` to two units of the last digit, 0.3 on average; odd, and never beyond 1.
 ///

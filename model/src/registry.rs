@@ -25,7 +25,6 @@ pub use roles::{
     ControllerPart, DriverContext, DriverPart, EstimatorPart, HalfError, Halves, HostDriver,
     HostDriverError, LoadRuns,
 };
-pub(crate) use scalar::died_out;
 pub use scalar::{AnyDynamics, AnyPhysics, HostReal};
 
 /// Registers a plant; made by [`declare_plant!`](crate::declare_plant).

@@ -2,6 +2,7 @@
 
 use loopsight_core::{Dynamics, Physics, Real};
 
+use crate::dual::died_out;
 use crate::{Dual, NarrowDual, TinyDual};
 
 /// A scalar that composed models are run with on a host.
@@ -12,17 +13,6 @@ pub trait HostReal: Real {
     fn physics(any: &'static dyn AnyPhysics) -> &'static dyn Physics<Self>;
     /// The number with zero for a value, and for each derivative, that is below 1.5e-154: its square is no normal number.
     fn settled(self) -> Self;
-}
-
-/// Where a number is so small that its square is no normal number, 1.5e-154, nothing is left of it; zero then.
-///
-/// What decays, as a speed at rest or its derivative by a state at the start, would go on to numbers below the smallest
-/// normal one, with which a processor computes a hundred times more slowly: friction with a time constant of 5 ms is there
-/// after 3.6 s.
-#[inline(always)]
-pub(crate) fn died_out(x: f64) -> f64 {
-    const NOTHING: f64 = 1.491_668_146_240_041_3e-154;
-    if x.abs() < NOTHING { 0.0 } else { x }
 }
 
 macro_rules! host_real {

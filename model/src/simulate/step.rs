@@ -84,8 +84,7 @@ impl<S: HostReal> Simulator<'_, S> {
             signals,
         } = scratch;
         let changing = ramping || !plan.steady;
-        let as_held = plan.inputs.is_empty();
-        if !changing && !as_held {
+        if !changing {
             u.copy_from_slice(held);
             let now = Now {
                 time: from,
@@ -97,7 +96,6 @@ impl<S: HostReal> Simulator<'_, S> {
             }
         }
         if *way == Way::Explicit && !plan.beside && pushed.rates.is_empty() && !ramping {
-            let u: &[S] = if as_held { held } else { u };
             let span = Steps {
                 count: steps,
                 length: S::of(h),
@@ -132,9 +130,6 @@ impl<S: HostReal> Simulator<'_, S> {
             if dynamics.steps_under(x, &under, signals, &mut act) {
                 return;
             }
-        }
-        if !changing && as_held {
-            u.copy_from_slice(held);
         }
         for step in 0..steps {
             let from = from + h * step as f64;
