@@ -126,6 +126,45 @@ impl<S: HostReal> History<S> {
         self.at(time).1
     }
 
+    /// Whether the `i`-th oldest entry is before `time`.
+    fn is_before(&self, i: usize, time: f64) -> bool {
+        let entry = self.entry(i).time;
+        entry < time || self.after && entry == time
+    }
+
+    /// The value that the signal has all the time from `from` to `to`, where it is constant between its entries and none of
+    /// them is there.
+    fn constant(&self, from: f64, to: f64) -> Option<S> {
+        if self.between != Between::Held || self.entries.is_empty() {
+            return None;
+        }
+        let entry = self.newest_before(to);
+        (entry == 0 || self.is_before(entry, from)).then(|| self.entry(entry).value)
+    }
+
+    /// The newest entry before `time`, or the oldest of all. What is looked for is mostly among the newest, so the search goes
+    /// back from them in growing strides, and then halves the last one.
+    fn newest_before(&self, time: f64) -> usize {
+        let is_before = |i: usize| self.is_before(i, time);
+        let mut high = self.entries.len();
+        let mut stride = 1;
+        let mut low = high.saturating_sub(stride);
+        while low > 0 && !is_before(low) {
+            high = low;
+            stride *= 2;
+            low = high.saturating_sub(stride);
+        }
+        while high - low > 1 {
+            let middle = usize::midpoint(low, high);
+            if is_before(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+
     /// Integral and value at `time`. At an entry the value is that from the side before it, to which a delay of
     /// zero is differentiated; a history for effects that look ahead takes the side after it. Before the first and after
     /// the last entry the signal is constant.
@@ -134,17 +173,7 @@ impl<S: HostReal> History<S> {
         if n == 0 {
             return (S::zero(), S::zero());
         }
-        let (mut low, mut high) = (0, n);
-        while high - low > 1 {
-            let middle = usize::midpoint(low, high);
-            let time = time.value();
-            let earlier = self.entry(middle).time;
-            if earlier < time || self.after && earlier == time {
-                low = middle
-            } else {
-                high = middle
-            }
-        }
+        let low = self.newest_before(time.value());
         let a = self.entry(low);
         let elapsed = time - S::of(a.time);
         if self.between == Between::Held || low + 1 == n || time.value() < a.time {
@@ -170,7 +199,8 @@ impl<S: HostReal> Past<S> for History<S> {
     fn mean(&self, from: S, to: S) -> S {
         let span = to - from;
         if span.value() > SHORT {
-            (self.at(to).0 - self.at(from).0) / span
+            let moved = || (self.at(to).0 - self.at(from).0) / span;
+            self.constant(from.value(), to.value()).unwrap_or_else(moved)
         } else {
             // The limit of the mean, with its derivatives by both bounds.
             (self.instant(from) + self.instant(to)) * S::of(0.5)
@@ -227,6 +257,22 @@ mod tests {
         assert!((derivative(&window, 0) + 4.5).abs() < 1e-12);
         let step = held.mean(now - delay, Dual::of(2.0) - delay);
         assert!((derivative(&step, 0) + 2.0).abs() < 1e-12);
+    }
+
+    /// Between two entries nothing of a difference of large integrals is left.
+    #[test]
+    fn a_constant_is_its_own_mean() {
+        let mut h = History::<Dual>::new(Between::Held);
+        for k in 0..2000 {
+            h.hold(0.1 * f64::from(k), Dual::of(0.3 * f64::from(k % 7)));
+        }
+        let delay = variable(0.052, 0);
+        for k in 1..2000 {
+            let to = 0.1 * f64::from(k);
+            let mean = h.mean(Dual::of(to - 0.04) - delay, Dual::of(to) - delay);
+            assert_eq!(mean.value(), 0.3 * f64::from((k - 1) % 7));
+            assert_eq!(derivative(&mean, 0), 0.0);
+        }
     }
 
     #[test]
