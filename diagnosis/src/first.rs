@@ -7,6 +7,7 @@ use nalgebra::DVector;
 use crate::criteria::{Criteria, StartCriteria};
 use crate::floor::{Part, noise};
 use crate::gram::gram;
+use crate::linearised::Linearised;
 use crate::problem::Problem;
 use crate::progress::Cancelled;
 use crate::window::lags;
@@ -85,13 +86,17 @@ impl Problem<'_> {
         if self.first.is_empty() {
             return Ok(false);
         }
-        let (mut residual, mut jacobian) = self.linearise(solution)?;
+        let residual = &self.linearise(solution)?.residual;
         let wrong = self.work.criteria().start.wrong;
-        let errors = self.lasting_errors(&residual);
+        let errors = self.lasting_errors(residual);
         let shares: Vec<f64> = errors.iter().map(|e| (e / wrong).min(1.0)).collect();
         if shares.iter().all(|share| *share == 1.0) {
             return Ok(false);
         }
+        let mut linear = self.linearise_once(solution)?;
+        let Linearised {
+            residual, jacobian, ..
+        } = &mut linear;
         let rows: Vec<usize> = self.first_rows().collect();
         let weights = self.first.iter_mut().flatten();
         for ((weight, share), row) in weights.zip(shares.iter().cycle()).zip(rows) {
@@ -100,14 +105,13 @@ impl Problem<'_> {
             jacobian.row_mut(row).scale_mut(now / *weight);
             *weight = now;
         }
-        let (_, inverse) = self.flat(&gram(&jacobian));
-        let step = &inverse * jacobian.tr_mul(&residual);
+        let (_, inverse) = self.flat(&gram(jacobian));
+        let step = &inverse * jacobian.tr_mul(residual);
         let variance = residual.norm_squared() / residual.len() as f64;
         let moves = (0..self.free.len())
             .any(|i| step[i].powi(2) > OFF.powi(2) * variance * inverse[(i, i)]);
         // Nothing needs to be simulated again.
-        self.cache
-            .replace(Some((solution.clone(), residual, jacobian)));
+        self.keep(linear);
         Ok(moves)
     }
 

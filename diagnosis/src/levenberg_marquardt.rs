@@ -1,9 +1,12 @@
 //! Least squares within bounds: Levenberg–Marquardt with a projected step.
 
+use std::rc::Rc;
+
 use loopsight_model::model::pseudo_inverse;
 use nalgebra::{DMatrix, DVector};
 
 use crate::gram::gram;
+use crate::linearised::Linearised;
 use crate::solve::Effort;
 
 /// Damping at the start, over the largest diagonal entry of `JᵀJ`.
@@ -31,7 +34,7 @@ pub(crate) trait LeastSquares {
     fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, Self::Error>;
 
     /// `r` at `x`, and its derivatives.
-    fn linearise(&self, x: &DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>), Self::Error>;
+    fn linearise(&self, x: &DVector<f64>) -> Result<Rc<Linearised>, Self::Error>;
 
     /// Lower and upper bounds.
     fn bounds(&self) -> (&DVector<f64>, &DVector<f64>);
@@ -139,8 +142,8 @@ pub(crate) fn minimise<P: LeastSquares>(
 struct Linear {
     /// `rᵀr`
     cost: f64,
-    /// `J`
-    jacobian: DMatrix<f64>,
+    /// `r` and `J`.
+    of: Rc<Linearised>,
     /// `JᵀJ`
     normal: DMatrix<f64>,
     /// `Jᵀr`
@@ -148,18 +151,18 @@ struct Linear {
 }
 
 impl Linear {
-    fn of((residual, jacobian): (DVector<f64>, DMatrix<f64>)) -> Self {
+    fn of(linear: Rc<Linearised>) -> Self {
         Self {
-            normal: gram(&jacobian),
-            gradient: jacobian.tr_mul(&residual),
-            cost: residual.norm_squared(),
-            jacobian,
+            normal: gram(&linear.jacobian),
+            gradient: linear.jacobian.tr_mul(&linear.residual),
+            cost: linear.residual.norm_squared(),
+            of: linear,
         }
     }
 
     /// What a full step gains, without bounds, from where the residuals are `residual`.
     fn within_reach(&self, residual: &DVector<f64>) -> f64 {
-        let gradient = self.jacobian.tr_mul(residual);
+        let gradient = self.of.jacobian.tr_mul(residual);
         let inverse = pseudo_inverse(&self.normal);
         inverse.map_or(f64::INFINITY, |i| gradient.dot(&(i * &gradient)))
     }
@@ -257,13 +260,14 @@ mod tests {
             Ok(DVector::from_vec((self.of)(x).0))
         }
 
-        fn linearise(&self, x: &DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>), Infallible> {
+        fn linearise(&self, x: &DVector<f64>) -> Result<Rc<Linearised>, Infallible> {
             self.linearised.set(self.linearised.get() + 1);
             let (r, j) = (self.of)(x);
-            Ok((
-                DVector::from_vec(r),
-                DMatrix::from_row_slice(j.len() / x.len(), x.len(), &j),
-            ))
+            Ok(Rc::new(Linearised {
+                at: x.clone(),
+                residual: DVector::from_vec(r),
+                jacobian: DMatrix::from_row_slice(j.len() / x.len(), x.len(), &j),
+            }))
         }
 
         fn bounds(&self) -> (&DVector<f64>, &DVector<f64>) {

@@ -258,7 +258,7 @@ impl Problem<'_> {
 
     /// The steepest row of the Jacobian over the one in the middle.
     pub(crate) fn steepness(&self, at: &DVector<f64>) -> Result<f64, Cancelled> {
-        let (mut norms, median) = row_norms(&self.linearise(at)?.1);
+        let (mut norms, median) = row_norms(&self.linearise(at)?.jacobian);
         // First samples have a larger weight, but are not steeper.
         for row in self.first_rows() {
             norms[row] = 0.0;
@@ -268,16 +268,17 @@ impl Problem<'_> {
 
     /// The fit that a solution gives: estimates, intervals, errors.
     pub(crate) fn result(&self, solution: &DVector<f64>) -> Result<Fit, Cancelled> {
-        let (residual, mut jacobian) = self.linearise(solution)?;
+        let linear = self.linearise(solution)?;
+        let (residual, mut jacobian) = (&linear.residual, linear.jacobian.clone());
         limit_rows(&mut jacobian, self.work.criteria().parameters.steep);
         let (flatness, inverse) = self.flat(&gram(&jacobian));
-        let blocks = self.blocks(&residual, &jacobian);
+        let blocks = self.blocks(residual, &jacobian);
         let (signals, unknowns) = (self.model.measured.len(), jacobian.ncols());
         let noise = noise::models(&blocks, signals, &self.work)?;
         let mut covariance = noise::covariance(&blocks, &noise, &inverse, unknowns, &self.work)?;
         for omission in self.omissions(solution)? {
             if let Some(omitted) =
-                self.omitted(&omission, (&residual, &noise), &jacobian, &inverse)?
+                self.omitted(&omission, (residual, &noise), &jacobian, &inverse)?
             {
                 omitted.widen(&mut covariance);
             }

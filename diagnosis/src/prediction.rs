@@ -1,19 +1,17 @@
-//! Simulated outputs with exact derivatives, initial states, and the one-step prediction.
+//! Simulated outputs, initial states, and the one-step prediction.
 
 use std::borrow::Cow;
 
-use loopsight_core::Real;
 use loopsight_model::model::{Model, pseudo_inverse};
-use loopsight_model::registry::HostReal;
 use loopsight_model::run::Run;
 use loopsight_model::simulate::{Simulator, try_follow};
-use loopsight_model::{DUAL_WIDTH, DualOf, NARROW_WIDTH, TINY_WIDTH, derivative, variable_of};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::long::ENOUGH;
 use crate::positions::{Positions, run_with};
 use crate::progress::{Cancelled, Work};
+use crate::sensitivities::{By, sensitivities};
 
 /// Plant states whose initial values are estimated: those that influence the measurements at the beginning of a
 /// run, or with an observer those that it observes. The others start at zero. Parameters that differ from run to run
@@ -57,22 +55,6 @@ pub(crate) fn moves_starts(
     Ok(false)
 }
 
-/// The free run over `run` and its derivatives by some parameters and initial states.
-pub(crate) struct Sensitivities {
-    /// Predictions, row by row: sample by sample, signal by signal.
-    pub(crate) predicted: Vec<f64>,
-    /// One row per prediction; first the `parameters`, then the `states`.
-    pub(crate) jacobian: DMatrix<f64>,
-}
-
-/// The unknowns that a simulation is differentiated by, by index.
-#[derive(Clone, Copy)]
-pub(crate) struct By<'a> {
-    pub(crate) parameters: &'a [usize],
-    /// Initial states of the plant.
-    pub(crate) states: &'a [usize],
-}
-
 /// What `simulate` makes of each of some runs from its initial state. Several runs are simulated at once.
 pub(crate) fn for_each_run<T: Send>(
     runs: &[Run],
@@ -84,119 +66,6 @@ pub(crate) fn for_each_run<T: Send>(
         // One run needs no other thread.
         [_] => runs.iter().zip(states).map(of).collect(),
         _ => runs.par_iter().zip(states).map(of).collect(),
-    }
-}
-
-/// Simulates `run` from `x0`, differentiated by the parameters and initial states that are listed
-/// (forward mode, [`TINY_WIDTH`], [`NARROW_WIDTH`] or [`DUAL_WIDTH`] at a time: two narrow passes cost less than a wide
-/// and a narrow one).
-pub(crate) fn sensitivities(
-    model: &Model,
-    values: &[f64],
-    x0: &[f64],
-    run: &Run,
-    by: By<'_>,
-    work: &Work<'_>,
-) -> Result<Sensitivities, Cancelled> {
-    sensitivities_with(None, model, values, x0, run, by, work)
-}
-
-/// As [`sensitivities`], with the positions as measured where they are given.
-pub(crate) fn sensitivities_with(
-    positions: Option<&Positions>,
-    model: &Model,
-    values: &[f64],
-    x0: &[f64],
-    run: &Run,
-    by: By<'_>,
-    work: &Work<'_>,
-) -> Result<Sensitivities, Cancelled> {
-    let columns = by.parameters.len() + by.states.len();
-    let rows = run.len() * model.measured.len();
-    let mut found = Sensitivities {
-        predicted: vec![0.0; rows],
-        jacobian: DMatrix::zeros(rows, columns),
-    };
-    let pass = Pass {
-        positions,
-        model,
-        values,
-        x0,
-        run,
-        by,
-        work,
-    };
-    let mut first = 0;
-    loop {
-        let left = columns - first;
-        if left <= TINY_WIDTH {
-            pass.run::<TINY_WIDTH>(first, &mut found)?;
-            first += TINY_WIDTH;
-        } else if left <= NARROW_WIDTH || (DUAL_WIDTH + 1..=2 * NARROW_WIDTH).contains(&left) {
-            pass.run::<NARROW_WIDTH>(first, &mut found)?;
-            first += NARROW_WIDTH;
-        } else {
-            pass.run::<DUAL_WIDTH>(first, &mut found)?;
-            first += DUAL_WIDTH;
-        }
-        if first >= columns {
-            return Ok(found);
-        }
-    }
-}
-
-/// A simulation that is differentiated by some of the unknowns.
-struct Pass<'a> {
-    positions: Option<&'a Positions>,
-    model: &'a Model,
-    values: &'a [f64],
-    x0: &'a [f64],
-    run: &'a Run,
-    by: By<'a>,
-    work: &'a Work<'a>,
-}
-
-impl Pass<'_> {
-    /// Simulates with the derivatives of `N` columns from the `first`.
-    fn run<const N: usize>(&self, first: usize, found: &mut Sensitivities) -> Result<(), Cancelled>
-    where
-        DualOf<N>: HostReal,
-    {
-        self.work.count_differentiated(self.run.len());
-        let By { parameters, states } = self.by;
-        let last = (first + N).min(parameters.len() + states.len());
-        let seed = |value: f64, place: Option<usize>| match place {
-            Some(column) if (first..last).contains(&column) => variable_of(value, column - first),
-            _ => DualOf::<N>::of(value),
-        };
-        let of_parameter =
-            |(i, v): (usize, &f64)| seed(*v, parameters.iter().position(|p| *p == i));
-        let of_state = |(i, v): (usize, &f64)| {
-            let place = states.iter().position(|s| *s == i);
-            seed(*v, place.map(|k| parameters.len() + k))
-        };
-        let values: Vec<DualOf<N>> = self.values.iter().enumerate().map(of_parameter).collect();
-        let x0: Vec<DualOf<N>> = self.x0.iter().enumerate().map(of_state).collect();
-        let n = self.model.measured.len();
-        let mut simulator = Simulator::new(self.model, &values).without_trail();
-        run_with(
-            self.positions,
-            &mut simulator,
-            &x0,
-            self.run,
-            n,
-            |k, outputs| {
-                self.work.go_on()?;
-                for (i, output) in outputs.iter().enumerate() {
-                    let row = k * outputs.len() + i;
-                    found.predicted[row] = output.value();
-                    for column in first..last {
-                        found.jacobian[(row, column)] = derivative(output, column - first);
-                    }
-                }
-                Ok(())
-            },
-        )
     }
 }
 
@@ -436,7 +305,9 @@ pub(crate) fn one_step(
 
 #[cfg(test)]
 mod tests {
+    use loopsight_model::registry::HostReal;
     use loopsight_model::run::Rows;
+    use loopsight_model::{DualOf, NARROW_WIDTH};
     use loopsight_plants as _;
 
     use super::*;

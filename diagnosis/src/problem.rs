@@ -1,6 +1,7 @@
 //! The least-squares problem of a fit to the free run.
 
 use std::cell::{Cell, RefCell};
+use std::rc::Rc;
 
 use loopsight_model::model::{Model, ModelParameter};
 use loopsight_model::run::Run;
@@ -9,17 +10,14 @@ use nalgebra::{DMatrix, DVector};
 use crate::error::FitError;
 use crate::first::first_weights;
 use crate::flatness::Named;
+use crate::linearised::Linearised;
 use crate::noise::Block;
 use crate::positions::Positions;
-use crate::prediction::{
-    By, Solution, estimated_states, for_each_run, predict_with, residuals, sensitivities_with,
-};
+use crate::prediction::{Solution, estimated_states, for_each_run, predict_with, residuals};
 use crate::progress::{Cancelled, Work};
 use crate::score::Tally;
+use crate::sensitivities::{By, sensitivities_with};
 use crate::sizes::sizes;
-
-/// Unknowns, weighted residuals there, and their Jacobian.
-type Linearised = (DVector<f64>, DVector<f64>, DMatrix<f64>);
 
 pub(crate) struct Problem<'a> {
     pub(crate) model: &'a Model,
@@ -40,7 +38,7 @@ pub(crate) struct Problem<'a> {
     /// Moving-average coefficient by signal; empty in the first pass.
     pub(crate) rounding: Vec<f64>,
     pub(crate) evaluations: Cell<u64>,
-    pub(crate) cache: RefCell<Option<Linearised>>,
+    cache: RefCell<Option<Rc<Linearised>>>,
     pub(crate) samples: f64,
     /// How many times as much the first sample of a run counts, by run and signal.
     pub(crate) first: Vec<Vec<f64>>,
@@ -175,8 +173,8 @@ impl<'a> Problem<'a> {
     /// expects (J. J. Moré, 1978, "The Levenberg-Marquardt algorithm", section 6).
     pub(crate) fn balance(&mut self, mut scaled: DVector<f64>) -> Result<DVector<f64>, Cancelled> {
         let dead = self.work.criteria().parameters.dead;
-        let (residual, mut jacobian) = self.linearise(&scaled)?;
-        for (i, mut column) in jacobian.column_iter_mut().enumerate() {
+        let mut linear = self.linearise_once(&scaled)?;
+        for (i, mut column) in linear.jacobian.column_iter_mut().enumerate() {
             let norm = column.norm();
             if norm > dead && norm.is_finite() {
                 self.scales[i] /= norm;
@@ -187,8 +185,8 @@ impl<'a> Problem<'a> {
             }
         }
         // The point is the same in other units: nothing needs to be simulated again.
-        self.cache
-            .replace(Some((scaled.clone(), residual, jacobian)));
+        linear.at.clone_from(&scaled);
+        self.keep(linear);
         Ok(scaled)
     }
 
@@ -292,21 +290,20 @@ impl<'a> Problem<'a> {
         self.best.borrow().clone()
     }
 
-    /// Weighted residuals, and their Jacobian by the scaled unknowns.
-    pub(crate) fn linearise(
-        &self,
-        scaled: &DVector<f64>,
-    ) -> Result<(DVector<f64>, DMatrix<f64>), Cancelled> {
-        if let Some((at, residual, jacobian)) = self.cache.borrow().as_ref()
-            && at == scaled
+    /// Weighted residuals, and their Jacobian by the scaled unknowns. What was computed last is kept.
+    pub(crate) fn linearise(&self, scaled: &DVector<f64>) -> Result<Rc<Linearised>, Cancelled> {
+        if let Some(linear) = self.cache.borrow().as_ref()
+            && linear.at == *scaled
         {
-            return Ok((residual.clone(), jacobian.clone()));
+            return Ok(Rc::clone(linear));
         }
+        self.forget();
         let (values, states) = self.unpack(scaled);
         let n_free = self.free.len();
         let n_visible = self.visible.len();
-        let mut all = DVector::zeros(self.rows());
-        let mut jacobian = DMatrix::zeros(self.rows(), self.scales.len());
+        let (rows, columns) = (self.rows(), self.scales.len());
+        let mut all = DVector::zeros(rows);
+        let mut jacobian = DMatrix::from_vec(rows, columns, vec![0.0; rows * columns]);
         let mut first_row = 0;
         let (positions, model, work) = (self.positions.as_ref(), self.model, &self.work);
         let by = By {
@@ -318,29 +315,57 @@ impl<'a> Problem<'a> {
         })?;
         for (index, (run, s)) in self.runs.iter().zip(sensitivities).enumerate() {
             let residual = residuals(&s.predicted, run);
-            for row in 0..residual.len() {
-                let finite = run.measured()[row].is_finite();
-                let weight = if finite { self.weight(index, row) } else { 0.0 };
-                all[first_row + row] = residual[row] * weight;
-                for column in 0..n_free + n_visible {
-                    let to = if column < n_free {
-                        column
-                    } else {
-                        column + index * n_visible
-                    };
-                    jacobian[(first_row + row, to)] =
-                        -s.jacobian[(row, column)] * weight * self.scales[to];
+            let rows = residual.len();
+            let weight = |(row, measured): (usize, &f64)| {
+                let counts = measured.is_finite();
+                if counts { self.weight(index, row) } else { 0.0 }
+            };
+            let weights: Vec<f64> = run.measured().iter().enumerate().map(weight).collect();
+            let of_run = &mut all.as_mut_slice()[first_row..first_row + rows];
+            for (to, (residual, weight)) in of_run.iter_mut().zip(residual.iter().zip(&weights)) {
+                *to = residual * weight;
+            }
+            self.filter(index, of_run, scaled);
+            for column in 0..n_free + n_visible {
+                let to = if column < n_free {
+                    column
+                } else {
+                    column + index * n_visible
+                };
+                let mut slopes = jacobian.view_mut((first_row, to), (rows, 1));
+                let from = s.jacobian.column(column);
+                for (to_row, (slope, weight)) in slopes.iter_mut().zip(from.iter().zip(&weights)) {
+                    *to_row = -slope * weight * self.scales[to];
                 }
             }
-            let rows = residual.len();
-            let of_run = &mut all.as_mut_slice()[first_row..first_row + rows];
-            self.filter(index, of_run, scaled);
             self.filter_jacobian(index, first_row, rows, &mut jacobian);
             first_row += rows;
         }
         self.remember(&all, values, states);
-        *self.cache.borrow_mut() = Some((scaled.clone(), all.clone(), jacobian.clone()));
-        Ok((all, jacobian))
+        Ok(self.keep(Linearised {
+            at: scaled.clone(),
+            residual: all,
+            jacobian,
+        }))
+    }
+
+    /// As [`Problem::linearise`], for who changes it: it is not kept.
+    pub(crate) fn linearise_once(&self, scaled: &DVector<f64>) -> Result<Linearised, Cancelled> {
+        let linear = self.linearise(scaled)?;
+        self.forget();
+        Ok(Rc::unwrap_or_clone(linear))
+    }
+
+    /// Keeps what need not be simulated again.
+    pub(crate) fn keep(&self, linear: Linearised) -> Rc<Linearised> {
+        let linear = Rc::new(linear);
+        self.cache.replace(Some(Rc::clone(&linear)));
+        linear
+    }
+
+    /// Keeps nothing of what was linearised.
+    pub(crate) fn forget(&self) {
+        self.cache.replace(None);
     }
 
     /// The estimated parameters, to describe flat directions with.

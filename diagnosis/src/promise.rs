@@ -135,7 +135,8 @@ impl<'a> Promises<'a> {
         let Solution { values, states } = nominal.solution;
         let mut problem = nominal.problem(&model, nominal.held)?;
         problem.positions = at.cloned();
-        let (_, jacobian) = problem.linearise(&problem.pack(values, states)).ok()?;
+        let there = problem.pack(values, states);
+        let jacobian = problem.linearise_once(&there).ok()?.jacobian;
         let gram = gram(&jacobian);
         gram.iter().all(|v| v.is_finite()).then(|| Linear {
             positions: at.cloned(),
@@ -152,18 +153,16 @@ impl Linear {
     fn promise(&self, problem: &mut Problem<'_>, start: &[f64]) -> Option<(f64, f64)> {
         problem.first.clone_from(&self.first);
         // What is known is no unknown.
-        let (residual, own) = problem.linearise(&problem.pack(start, &[])).ok()?;
+        let linear = problem.linearise(&problem.pack(start, &[])).ok()?;
+        let (residual, own) = (&linear.residual, &linear.jacobian);
         let (n, m) = (self.gram.ncols(), own.ncols());
         let mut gram = self.gram.clone().resize(n + m, n + m, 0.0);
-        let across = self.jacobian.tr_mul(&own);
+        let across = self.jacobian.tr_mul(own);
         gram.view_mut((0, n), (n, m)).copy_from(&across);
         gram.view_mut((n, 0), (m, n)).copy_from(&across.transpose());
-        gram.view_mut((n, n), (m, m)).copy_from(&own.tr_mul(&own));
-        let mut right = self
-            .jacobian
-            .tr_mul(&residual)
-            .resize_vertically(n + m, 0.0);
-        right.rows_mut(n, m).copy_from(&own.tr_mul(&residual));
+        gram.view_mut((n, n), (m, m)).copy_from(&own.tr_mul(own));
+        let mut right = self.jacobian.tr_mul(residual).resize_vertically(n + m, 0.0);
+        right.rows_mut(n, m).copy_from(&own.tr_mul(residual));
         let before = residual.norm_squared();
         let after = before - right.dot(&(pseudo_inverse(&gram)? * &right));
         after.is_finite().then_some((before, after.max(0.0)))
@@ -209,7 +208,7 @@ mod tests {
             |model| Problem::with(model, &runs, None, Some(states.clone()), Work::quiet()).unwrap();
         let of_plain = problem(&plain);
         let at = of_plain.pack(&plain.values(), &states);
-        let (_, jacobian) = of_plain.linearise(&at).unwrap();
+        let jacobian = of_plain.linearise_once(&at).unwrap().jacobian;
         let linear = Linear {
             positions: None,
             first: Vec::new(),

@@ -12,7 +12,7 @@ use crate::fitted::Fit;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
 use crate::output_error::fitted_values;
-use crate::progress::{Stage, Work};
+use crate::progress::{Cancelled, Stage, Work};
 use crate::solve::Effort;
 use crate::split::split;
 use crate::suited::smooth;
@@ -255,13 +255,17 @@ pub(crate) fn still_open(
         return Ok(open);
     }
     let silent = work.silently();
-    let bar = match refitted(model, measurements, &silent) {
+    let (now, fitted) = rayon::join(
+        || refitted(model, measurements, &silent),
+        || all_refitted(candidates, measurements, &silent),
+    );
+    let bar = match now {
         Err(FitError::Cancelled(cancelled)) => return Err(cancelled.into()),
         // Nothing can be told from a model whose free run diverges.
         Err(_) => return Ok(open),
         Ok((error, _)) => error / work.criteria().improve.better,
     };
-    for ((index, twin), ..) in no_worse(candidates, |_| bar, measurements, &silent)? {
+    for ((index, twin), ..) in fitted?.into_iter().filter(|(_, error, _)| *error <= bar) {
         open[index].push(twin.clone());
     }
     Ok(open)
@@ -335,18 +339,23 @@ impl Refined<'_> {
         self.changes += candidates.len() as u64;
         self.work.tell(Stage::Refining, self.changes, self.changes);
         let silent = self.work.silently();
-        let now = match self.error {
-            Some(now) => now,
-            // Any other model is better than one whose free run diverges.
-            None => match refitted(self.model, self.measurements, &silent) {
-                Err(FitError::Cancelled(cancelled)) => return Err(cancelled.into()),
-                found => found.map_or(f64::INFINITY, |(error, _)| error),
+        let (now, fitted) = rayon::join(
+            || match self.error {
+                Some(now) => Ok(now),
+                // Any other model is better than one whose free run diverges.
+                None => match refitted(self.model, self.measurements, &silent) {
+                    Err(FitError::Cancelled(cancelled)) => Err(cancelled),
+                    found => Ok(found.map_or(f64::INFINITY, |(error, _)| error)),
+                },
             },
-        };
+            || all_refitted(candidates, self.measurements, &silent),
+        );
+        let now = now?;
         self.error = Some(now);
-        let bar = |model: &Model| (share(model) * now).min(most);
-        let fitted = no_worse(candidates, bar, self.measurements, &silent)?;
-        let best = fitted.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        let good = |model: &Model, error: f64| error <= (share(model) * now).min(most);
+        let best = (fitted?.into_iter())
+            .filter(|(_, error, model)| good(model, *error))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
         Ok(best.map(|(what, error, model)| {
             *self.model = model;
             self.error = Some(error);
@@ -366,21 +375,18 @@ pub(crate) fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
         .collect()
 }
 
-/// The `candidates` that a short fit brings to an error of at most `bar`, fitted, in their order. Those that cannot be
-/// fitted, because their free run diverges, are not among them.
-fn no_worse<T: Send>(
+/// The `candidates` after a short fit each, with their errors, in their order. Those that cannot be fitted, because their free
+/// run diverges, are not among them.
+fn all_refitted<T: Send>(
     candidates: Vec<(T, Model)>,
-    bar: impl Fn(&Model) -> f64 + Sync,
     measurements: &Measurements<'_>,
     work: &Work<'_>,
-) -> Result<Vec<(T, f64, Model)>, FitError> {
-    let fitted = candidates
-        .into_par_iter()
-        .filter_map(|(what, model)| {
-            let (error, model) = refitted(&model, measurements, work).ok()?;
-            (error <= bar(&model)).then_some((what, error, model))
-        })
-        .collect();
+) -> Result<Vec<(T, f64, Model)>, Cancelled> {
+    let refit = |(what, model)| {
+        let (error, model) = refitted(&model, measurements, work).ok()?;
+        Some((what, error, model))
+    };
+    let fitted = candidates.into_par_iter().filter_map(refit).collect();
     // After a cancellation some were not tried.
     work.go_on()?;
     Ok(fitted)

@@ -12,8 +12,9 @@ impl Problem<'_> {
         &mut self,
         solution: &DVector<f64>,
     ) -> Result<Option<DVector<f64>>, Cancelled> {
-        let (residual, jacobian) = self.linearise(solution)?;
-        let blocks = self.blocks(&residual, &jacobian);
+        let linear = self.linearise(solution)?;
+        let residual = &linear.residual;
+        let blocks = self.blocks(residual, &linear.jacobian);
         let criteria = &self.work.criteria().parameters;
         let n_signals = self.weights.len();
         let rounding: Vec<f64> = (noise::models(&blocks, n_signals, &self.work)?.iter())
@@ -26,7 +27,7 @@ impl Problem<'_> {
             return Ok(None);
         }
         self.rounding = rounding;
-        self.cache.replace(None);
+        self.forget();
         let more = self.runs.len() * n_signals;
         // `ε` is in units of the residuals of the first pass, so that all unknowns are of order one.
         let scale = residual.norm() / (residual.len() as f64).sqrt();

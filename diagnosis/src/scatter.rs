@@ -54,7 +54,8 @@ impl Problem<'_> {
     /// ten times too large makes a fit take the input away altogether.
     fn amplified(&self, mut start: Start) -> Result<Start, FitError> {
         let at = self.pack(&start.values, &start.states);
-        let (residual, jacobian) = self.linearise(&at)?;
+        let linear = self.linearise(&at)?;
+        let (residual, jacobian) = (&linear.residual, &linear.jacobian);
         let (lower, upper) = (&self.lower, &self.upper);
         let mut best: Option<(f64, nalgebra::DVector<f64>)> = None;
         for parameter in 0..self.free.len() {
@@ -63,10 +64,10 @@ impl Problem<'_> {
                 .chain(self.free.len()..jacobian.ncols())
                 .collect();
             let columns: DMatrix<f64> = jacobian.select_columns(&unknowns);
-            let Some(step) = least_squares(&columns, &residual) else {
+            let Some(step) = least_squares(&columns, residual) else {
                 continue;
             };
-            let left = (&residual - &columns * &step).norm_squared();
+            let left = (residual - &columns * &step).norm_squared();
             if left.is_finite() && best.as_ref().is_none_or(|(least, _)| left < *least) {
                 let mut there = at.clone();
                 for (unknown, step) in unknowns.iter().zip(step.iter()) {

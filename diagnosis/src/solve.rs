@@ -1,9 +1,12 @@
 //! The solution of a least-squares problem: Levenberg–Marquardt within bounds.
 
-use nalgebra::{DMatrix, DVector};
+use std::rc::Rc;
+
+use nalgebra::DVector;
 
 use crate::error::FitError;
 use crate::levenberg_marquardt::{LeastSquares, minimise};
+use crate::linearised::Linearised;
 use crate::prediction::Solution;
 use crate::problem::Problem;
 use crate::progress::{Cancelled, Stage};
@@ -87,14 +90,14 @@ impl LeastSquares for Borrowed<'_, '_> {
     }
 
     /// One simulation gives both the prediction and its derivatives.
-    fn linearise(&self, scaled: &DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>), Cancelled> {
-        let (residual, jacobian) = self.0.linearise(scaled)?;
+    fn linearise(&self, scaled: &DVector<f64>) -> Result<Rc<Linearised>, Cancelled> {
+        let linear = self.0.linearise(scaled)?;
         let done = self.0.evaluations.get() + 1;
         self.0.evaluations.set(done);
-        let error = Some(residual.norm());
+        let error = Some(linear.residual.norm());
         let total = self.1.iterations.max(done);
         self.0.work.tell_error(Stage::Fitting, done, total, error);
-        Ok((residual, jacobian))
+        Ok(linear)
     }
 
     fn bounds(&self) -> (&DVector<f64>, &DVector<f64>) {

@@ -22,9 +22,10 @@ impl Problem<'_> {
 
     /// The same at scaled unknowns.
     pub(crate) fn promise_at(&self, at: &DVector<f64>) -> Result<Option<(f64, f64)>, Cancelled> {
-        let (residual, jacobian) = self.linearise(at)?;
-        let gram = gram(&jacobian);
-        let right = jacobian.tr_mul(&residual);
+        let linear = self.linearise(at)?;
+        let (residual, jacobian) = (&linear.residual, &linear.jacobian);
+        let gram = gram(jacobian);
+        let right = jacobian.tr_mul(residual);
         let Some(inverse) = pseudo_inverse(&gram) else {
             return Ok(None);
         };
@@ -43,7 +44,8 @@ impl Problem<'_> {
         fixed: &[usize],
     ) -> Result<Option<Vec<f64>>, Cancelled> {
         let start = self.pack(values, states);
-        let (residual, mut jacobian) = self.linearise(&start)?;
+        let linear = self.linearise(&start)?;
+        let (residual, mut jacobian) = (&linear.residual, linear.jacobian.clone());
         for (column, index) in self.free.iter().enumerate() {
             if fixed.contains(index) {
                 jacobian.column_mut(column).fill(0.0);
@@ -52,7 +54,7 @@ impl Problem<'_> {
         let Some(inverse) = pseudo_inverse(&jacobian.tr_mul(&jacobian)) else {
             return Ok(None);
         };
-        let step = inverse * jacobian.tr_mul(&residual);
+        let step = inverse * jacobian.tr_mul(residual);
         let (mut values, _) = self.unpack(&(start - step));
         for index in &self.free {
             let declaration = self.model.parameters[*index].declaration;

@@ -7,8 +7,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::experiment::Drive;
 use crate::noise::Arma;
-use crate::prediction::{By, predict, residuals, sensitivities};
+use crate::prediction::{predict, residuals};
 use crate::progress::{Cancelled, Work};
+use crate::sensitivities::{By, sensitivities};
 
 /// What separates two models under one drive, in units of the sensors' noise.
 #[derive(Clone, Debug)]
