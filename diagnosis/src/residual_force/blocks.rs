@@ -2,6 +2,7 @@
 
 use loopsight_model::run::Run;
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::response::Responses;
 use crate::progress::{Cancelled, Work};
@@ -62,26 +63,34 @@ impl Blocks {
         } else {
             responses.innovations.len() / block.len()
         };
-        let mut blocks = Self {
-            gram: Vec::with_capacity(n),
-            right: Vec::with_capacity(n),
-            square: Vec::with_capacity(n),
-            rows: responses.innovations.iter().filter(|v| **v != 0.0).count() as f64,
-            ridge,
-        };
+        let mut parts = Vec::with_capacity(n);
         let mut from = 0;
         for part in block.chunk_by(|a, b| a == b) {
-            work.go_on()?;
             let rows = part.len() * per_sample;
+            parts.push((from, rows));
+            from += rows;
+        }
+        let products = |(from, rows): (usize, usize)| {
+            work.go_on()?;
             let x = responses.columns.rows(from, rows);
             let y = responses.innovations.rows(from, rows);
             let transposed = x.transpose();
-            blocks.gram.push(&transposed * x);
-            blocks.right.push(&transposed * y);
-            blocks.square.push(y.norm_squared());
-            from += rows;
-        }
-        Ok(blocks)
+            Ok((&transposed * x, &transposed * y))
+        };
+        let (gram, right) = (parts.par_iter().copied().map(products))
+            .collect::<Result<Vec<_>, Cancelled>>()?
+            .into_iter()
+            .unzip();
+        let of_block = |(from, rows): (usize, usize)| responses.innovations.rows(from, rows);
+        Ok(Self {
+            gram,
+            right,
+            square: (parts.into_iter().map(of_block))
+                .map(|y| y.norm_squared())
+                .collect(),
+            rows: responses.innovations.iter().filter(|v| **v != 0.0).count() as f64,
+            ridge,
+        })
     }
 
     /// Sum of squares of the values to explain.

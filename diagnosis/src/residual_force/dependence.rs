@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use loopsight_core::Role;
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::blocks::Blocks;
@@ -91,6 +92,7 @@ pub(super) fn dependences(
     work: &Work<'_>,
 ) -> Result<Vec<ForceDependence>, Cancelled> {
     let mut all: Vec<ForceDependence> = (0..group.quantities.len())
+        .into_par_iter()
         .filter_map(|q| dependence(followed, group, at, laws, q, work).transpose())
         .collect::<Result<_, Cancelled>>()?;
     all.sort_by(|a, b| b.share_of_variance.total_cmp(&a.share_of_variance));

@@ -92,7 +92,7 @@ fn batch_of(
     let mut beyond = vec![Dual::of(0.0); ny];
     let mut first = 0;
     for ((run, x0), filtered) in runs.iter().zip(&solution.states).zip(filtered) {
-        let mut simulator = Simulator::new(model, &values);
+        let mut simulator = Simulator::new(model, &values).without_trail();
         let mut rounded = vec![Dual::of(0.0); ny];
         let nx = model.n_states();
         let correction = |beyond: &[Dual], k: usize, i: usize| {

@@ -200,7 +200,8 @@ impl<S: HostReal> Past<S> for History<S> {
         let span = to - from;
         if span.value() > SHORT {
             let moved = || (self.at(to).0 - self.at(from).0) / span;
-            self.constant(from.value(), to.value()).unwrap_or_else(moved)
+            self.constant(from.value(), to.value())
+                .unwrap_or_else(moved)
         } else {
             // The limit of the mean, with its derivatives by both bounds.
             (self.instant(from) + self.instant(to)) * S::of(0.5)
