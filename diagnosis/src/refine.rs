@@ -1,5 +1,7 @@
 //! Corrections to a model once another effect was added to it.
 
+use std::collections::BTreeSet;
+
 use loopsight_model::model::{Attached, Model, ModelParameter};
 use rayon::prelude::*;
 
@@ -233,7 +235,7 @@ fn is_narrower(this: &EffectAt, other: &EffectAt) -> bool {
 }
 
 /// For each of `steps`, the effects that the data still cannot tell from its own at the end. These are twins of
-/// its diagnosis: with one in its place, the finished `model`, fitted again, is about as good. Its error then is
+/// its diagnosis: with one in its place, the finished `model`, as that diagnosis fitted it or fitted again, is about as good. Its error then is
 /// not larger by more than the ratio `improve.better`, which also makes [`refine`] exchange effects. A twin that
 /// no longer fits into the model is left out.
 pub(crate) fn still_open(
@@ -248,27 +250,57 @@ pub(crate) fn still_open(
         .enumerate()
         .filter_map(|(index, step)| Some((index, step.added.as_ref()?, twins(step, diagnoses))))
         .flat_map(|(index, place, twins)| twins.into_iter().map(move |twin| (index, place, twin)))
-        .filter_map(|(index, place, twin)| Some(((index, twin), exchanged(model, place, twin)?)))
+        .filter_map(|(index, place, twin)| {
+            let exchanged = exchanged(model, place, twin)?;
+            let known = diagnosed(&steps[index], diagnoses, twin, &exchanged);
+            Some(((index, twin), known.unwrap_or(exchanged)))
+        })
         .collect();
     let mut open = vec![Vec::new(); steps.len()];
     if candidates.is_empty() {
         return Ok(open);
     }
     let silent = work.silently();
-    let (now, fitted) = rayon::join(
-        || refitted(model, measurements, &silent),
-        || all_refitted(candidates, measurements, &silent),
-    );
-    let bar = match now {
+    let judging = Measurements::new(measurements.judging());
+    let bar = match free_run_error(model, &judging, &silent).map_err(FitError::from) {
         Err(FitError::Cancelled(cancelled)) => return Err(cancelled.into()),
         // Nothing can be told from a model whose free run diverges.
         Err(_) => return Ok(open),
-        Ok((error, _)) => error / work.criteria().improve.better,
+        Ok(error) => error / work.criteria().improve.better,
     };
-    for ((index, twin), ..) in fitted?.into_iter().filter(|(_, error, _)| *error <= bar) {
+    let good = |model: &Model| {
+        // One that a diagnosis fitted needs no other fit.
+        let begins = free_run_error(model, &judging, &silent);
+        begins.is_ok_and(|error| error <= bar)
+            || refitted(model, measurements, &silent).is_ok_and(|(error, _)| error <= bar)
+    };
+    let found: Vec<_> = (candidates.into_par_iter())
+        .filter_map(|(of, model)| good(&model).then_some(of))
+        .collect();
+    // After a cancellation some were not tried.
+    work.go_on()?;
+    for (index, twin) in found {
         open[index].push(twin.clone());
     }
     Ok(open)
+}
+
+/// The model that the diagnosis of a `step` fitted with the `twin` of its effect, where it has the effects of `exchanged`:
+/// nothing else was changed since.
+fn diagnosed(
+    step: &ImprovementStep,
+    diagnoses: &[Diagnosis],
+    twin: &EffectAt,
+    exchanged: &Model,
+) -> Option<Model> {
+    let candidates = &diagnoses.get(step.round?)?.candidates;
+    let effects = |model: &Model| -> BTreeSet<(&str, Vec<&str>)> {
+        let of = |effect: &Attached| (effect.meta.id, effect.at.iter().map(|c| c.id).collect());
+        model.effects.iter().map(of).collect()
+    };
+    let model = &candidates.iter().find(|c| c.place == *twin)?.model;
+    let same = effects(model) == effects(exchanged) && free(model) == free(exchanged);
+    same.then(|| model.clone())
 }
 
 /// What the data could not tell from the effect of a step when it was added.
