@@ -234,10 +234,10 @@ fn is_narrower(this: &EffectAt, other: &EffectAt) -> bool {
     this.effect == other.effect && within && this.at.len() < other.at.len()
 }
 
-/// For each of `steps`, the effects that the data still cannot tell from its own at the end. These are twins of
-/// its diagnosis: with one in its place, the finished `model`, as that diagnosis fitted it or fitted again, is about as good. Its error then is
-/// not larger by more than the ratio `improve.better`, which also makes [`refine`] exchange effects. A twin that
-/// no longer fits into the model is left out.
+/// For each of `steps`, the effects that the data still cannot tell from its own at the end. These are twins of its diagnosis:
+/// with one in its place, the finished `model`, as that diagnosis fitted it or fitted again, is about as good. Its error then
+/// is not larger by more than the ratio `improve.better`, which also makes [`refine`] exchange effects. A twin that no longer
+/// fits into the model is left out.
 pub(crate) fn still_open(
     model: &Model,
     steps: &[ImprovementStep],
