@@ -86,9 +86,8 @@ impl Problem<'_> {
         if self.first.is_empty() {
             return Ok(false);
         }
-        let residual = &self.linearise(solution)?.residual;
         let wrong = self.work.criteria().start.wrong;
-        let errors = self.lasting_errors(residual);
+        let errors = self.lasting_errors(&self.linearise(solution)?.residual);
         let shares: Vec<f64> = errors.iter().map(|e| (e / wrong).min(1.0)).collect();
         if shares.iter().all(|share| *share == 1.0) {
             return Ok(false);

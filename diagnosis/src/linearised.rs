@@ -2,6 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// A matrix of zeros which the system hands out as such: what stays zero is not written.
+pub(crate) fn zeros(rows: usize, columns: usize) -> DMatrix<f64> {
+    DMatrix::from_vec(rows, columns, vec![0.0; rows * columns])
+}
+
 /// Residuals as linear functions of the unknowns.
 #[derive(Clone)]
 pub(crate) struct Linearised {

@@ -47,7 +47,15 @@ pub(crate) fn moves_starts(
     };
     for (run, x0) in runs.iter().zip(&solution.states) {
         let first = run.part(0..run.len().min(1));
-        let found = sensitivities(model, &solution.values, x0.as_slice(), &first, by, work)?;
+        let found = sensitivities(
+            None,
+            model,
+            &solution.values,
+            x0.as_slice(),
+            &first,
+            by,
+            work,
+        )?;
         if found.jacobian.iter().any(|slope| *slope != 0.0) {
             return Ok(true);
         }
@@ -203,7 +211,7 @@ impl InitialStates {
         let mut found = DVector::from_column_slice(x0);
         let mut best = cost(&found)?;
         for _ in 0..iterations {
-            let s = sensitivities(model, values, found.as_slice(), run, by, work)?;
+            let s = sensitivities(None, model, values, found.as_slice(), run, by, work)?;
             let residual = residuals(&s.predicted, run);
             let Some(step) = least_squares(&s.jacobian, &residual) else {
                 break;
@@ -351,7 +359,7 @@ mod tests {
             parameters: &[0],
             states: &[0],
         };
-        let found = sensitivities(&model, &values, &x0, &run, by, &work).unwrap();
+        let found = sensitivities(None, &model, &values, &x0, &run, by, &work).unwrap();
         assert_eq!(
             found.predicted,
             with_all::<DualOf<NARROW_WIDTH>>(&model, &run)

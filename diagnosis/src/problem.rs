@@ -10,13 +10,13 @@ use nalgebra::{DMatrix, DVector};
 use crate::error::FitError;
 use crate::first::first_weights;
 use crate::flatness::Named;
-use crate::linearised::Linearised;
+use crate::linearised::{Linearised, zeros};
 use crate::noise::Block;
 use crate::positions::Positions;
 use crate::prediction::{Solution, estimated_states, for_each_run, predict_with, residuals};
 use crate::progress::{Cancelled, Work};
 use crate::score::Tally;
-use crate::sensitivities::{By, sensitivities_with};
+use crate::sensitivities::{By, sensitivities};
 use crate::sizes::sizes;
 
 pub(crate) struct Problem<'a> {
@@ -250,17 +250,22 @@ impl<'a> Problem<'a> {
         let (values, states) = self.unpack(scaled);
         let mut all = Vec::with_capacity(self.rows());
         let predicted = self.free_runs(&values, &states)?;
-        for (index, (run, predicted)) in self.runs.iter().zip(&predicted).enumerate() {
-            let mut residual = residuals(predicted, run);
-            for (row, value) in residual.iter_mut().enumerate() {
-                *value *= self.weight(index, row);
-            }
-            self.filter(index, residual.as_mut_slice(), scaled);
-            all.extend_from_slice(residual.as_slice());
+        for (index, predicted) in predicted.iter().enumerate() {
+            all.extend_from_slice(self.weighted(index, predicted, scaled).as_slice());
         }
         let all = DVector::from_vec(all);
         self.remember(&all, values, states);
         Ok(all)
+    }
+
+    /// Weighted residuals of one run.
+    fn weighted(&self, run: usize, predicted: &[f64], scaled: &DVector<f64>) -> DVector<f64> {
+        let mut residual = residuals(predicted, &self.runs[run]);
+        for (row, value) in residual.iter_mut().enumerate() {
+            *value *= self.weight(run, row);
+        }
+        self.filter(run, residual.as_mut_slice(), scaled);
+        residual
     }
 
     /// The free runs with these values, from these initial states.
@@ -303,7 +308,7 @@ impl<'a> Problem<'a> {
         let n_visible = self.visible.len();
         let (rows, columns) = (self.rows(), self.scales.len());
         let mut all = DVector::zeros(rows);
-        let mut jacobian = DMatrix::from_vec(rows, columns, vec![0.0; rows * columns]);
+        let mut jacobian = zeros(rows, columns);
         let mut first_row = 0;
         let (positions, model, work) = (self.positions.as_ref(), self.model, &self.work);
         let by = By {
@@ -311,21 +316,17 @@ impl<'a> Problem<'a> {
             states: &self.visible,
         };
         let sensitivities = for_each_run(self.runs, &states, |run, x0| {
-            sensitivities_with(positions, model, &values, x0, run, by, work)
+            sensitivities(positions, model, &values, x0, run, by, work)
         })?;
         for (index, (run, s)) in self.runs.iter().zip(sensitivities).enumerate() {
-            let residual = residuals(&s.predicted, run);
+            let residual = self.weighted(index, &s.predicted, scaled);
             let rows = residual.len();
+            all.rows_mut(first_row, rows).copy_from(&residual);
             let weight = |(row, measured): (usize, &f64)| {
                 let counts = measured.is_finite();
                 if counts { self.weight(index, row) } else { 0.0 }
             };
             let weights: Vec<f64> = run.measured().iter().enumerate().map(weight).collect();
-            let of_run = &mut all.as_mut_slice()[first_row..first_row + rows];
-            for (to, (residual, weight)) in of_run.iter_mut().zip(residual.iter().zip(&weights)) {
-                *to = residual * weight;
-            }
-            self.filter(index, of_run, scaled);
             for column in 0..n_free + n_visible {
                 let to = if column < n_free {
                     column

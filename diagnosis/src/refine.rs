@@ -275,7 +275,8 @@ pub(crate) fn still_open(
             || refitted(model, measurements, &silent).is_ok_and(|(error, _)| error <= bar)
     };
     let found: Vec<_> = (candidates.into_par_iter())
-        .filter_map(|(of, model)| good(&model).then_some(of))
+        .filter(|(_, model)| good(model))
+        .map(|(of, _)| of)
         .collect();
     // After a cancellation some were not tried.
     work.go_on()?;

@@ -9,6 +9,7 @@ use loopsight_model::{DUAL_WIDTH, DualOf, NARROW_WIDTH, TINY_WIDTH, derivative, 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use crate::linearised::zeros;
 use crate::positions::{Positions, run_with};
 use crate::progress::{Cancelled, Work};
 
@@ -29,20 +30,9 @@ pub(crate) struct By<'a> {
 }
 
 /// Simulates `run` from `x0`, differentiated by the parameters and initial states that are listed
-/// (forward mode, [`TINY_WIDTH`], [`NARROW_WIDTH`] or [`DUAL_WIDTH`] at a time; several passes at once).
+/// (forward mode, [`TINY_WIDTH`], [`NARROW_WIDTH`] or [`DUAL_WIDTH`] at a time; several passes at once),
+/// with the positions as measured where they are given.
 pub(crate) fn sensitivities(
-    model: &Model,
-    values: &[f64],
-    x0: &[f64],
-    run: &Run,
-    by: By<'_>,
-    work: &Work<'_>,
-) -> Result<Sensitivities, Cancelled> {
-    sensitivities_with(None, model, values, x0, run, by, work)
-}
-
-/// As [`sensitivities`], with the positions as measured where they are given.
-pub(crate) fn sensitivities_with(
     positions: Option<&Positions>,
     model: &Model,
     values: &[f64],
@@ -54,7 +44,7 @@ pub(crate) fn sensitivities_with(
     let columns = by.parameters.len() + by.states.len();
     let rows = run.len() * model.measured.len();
     let mut predicted = vec![0.0; rows];
-    let mut jacobian = DMatrix::from_vec(rows, columns, vec![0.0; rows * columns]);
+    let mut jacobian = zeros(rows, columns);
     let pass = Pass {
         positions,
         model,
@@ -64,22 +54,19 @@ pub(crate) fn sensitivities_with(
         by,
         work,
     };
+    // Each pass has the prediction, and the first one writes it.
+    let mut of_first = Some(&mut predicted);
     let (mut first, mut slopes) = (0, jacobian.as_mut_slice());
     let mut passes = Vec::new();
-    loop {
+    while first < columns || passes.is_empty() {
         let width = width(columns - first);
         let of_pass = width.min(columns - first);
         let (own, rest) = slopes.split_at_mut(of_pass * rows);
-        passes.push((first, width, own));
+        passes.push((width, first, own, of_first.take()));
         (first, slopes) = (first + of_pass, rest);
-        if first == columns {
-            break;
-        }
     }
-    // Each pass has the prediction, and the first one writes it.
-    let mut of_first = Some(&mut predicted);
-    let passes: Vec<_> = passes.into_iter().map(|p| (p, of_first.take())).collect();
-    let simulate = |((first, width, slopes), predicted): (_, Option<&mut Vec<f64>>)| match width {
+    let simulate = |(width, first, slopes, predicted): (_, _, _, Option<&mut Vec<f64>>)| match width
+    {
         TINY_WIDTH => pass.run::<TINY_WIDTH>(first, slopes, predicted),
         NARROW_WIDTH => pass.run::<NARROW_WIDTH>(first, slopes, predicted),
         _ => pass.run::<DUAL_WIDTH>(first, slopes, predicted),

@@ -76,7 +76,7 @@ pub(crate) fn rival(
         states: &[],
     };
     for _ in 0..iterations {
-        let s = sensitivities(model, &values, &x0, truth, by, work)?;
+        let s = sensitivities(None, model, &values, &x0, truth, by, work)?;
         let jacobian = scaled(model, &free, s.jacobian, noise);
         let gram = jacobian.tr_mul(&jacobian);
         let Some(inverse) = pseudo_inverse(&gram) else {
@@ -134,7 +134,7 @@ pub(crate) fn information(
         parameters: free,
         states: &[],
     };
-    let s = sensitivities(model, values, &x0, &run, by, work)?;
+    let s = sensitivities(None, model, values, &x0, &run, by, work)?;
     let jacobian = scaled(model, free, s.jacobian, noise);
     let mut coloured = jacobian.clone();
     let n = noise.len();

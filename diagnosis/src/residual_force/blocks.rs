@@ -81,13 +81,14 @@ impl Blocks {
             .collect::<Result<Vec<_>, Cancelled>>()?
             .into_iter()
             .unzip();
-        let of_block = |(from, rows): (usize, usize)| responses.innovations.rows(from, rows);
+        let square = |(from, rows): &(usize, usize)| {
+            let y = responses.innovations.rows(*from, *rows);
+            y.norm_squared()
+        };
         Ok(Self {
             gram,
             right,
-            square: (parts.into_iter().map(of_block))
-                .map(|y| y.norm_squared())
-                .collect(),
+            square: parts.iter().map(square).collect(),
             rows: responses.innovations.iter().filter(|v| **v != 0.0).count() as f64,
             ridge,
         })

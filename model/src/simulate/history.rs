@@ -145,18 +145,17 @@ impl<S: HostReal> History<S> {
     /// The newest entry before `time`, or the oldest of all. What is looked for is mostly among the newest, so the search goes
     /// back from them in growing strides, and then halves the last one.
     fn newest_before(&self, time: f64) -> usize {
-        let is_before = |i: usize| self.is_before(i, time);
         let mut high = self.entries.len();
         let mut stride = 1;
         let mut low = high.saturating_sub(stride);
-        while low > 0 && !is_before(low) {
+        while low > 0 && !self.is_before(low, time) {
             high = low;
             stride *= 2;
             low = high.saturating_sub(stride);
         }
         while high - low > 1 {
             let middle = usize::midpoint(low, high);
-            if is_before(middle) {
+            if self.is_before(middle, time) {
                 low = middle;
             } else {
                 high = middle;
