@@ -106,7 +106,7 @@ pub struct Diagnosis {
     pub verdict: Conclusion,
     /// The missing effect.
     pub missing: Option<EffectAt>,
-    /// Explanations, best first.
+    /// Explanations, best first. None where the model leaves hardly more than noise, and no effect promises to explain any of it.
     pub candidates: Vec<Explanation>,
     /// Effects that were not tried, because the recording cannot show them.
     pub not_tried: Vec<Untried>,

@@ -146,6 +146,8 @@ struct State {
     before: Option<(Model, Vec<ImprovementStep>)>,
     steps: Vec<ImprovementStep>,
     diagnoses: Vec<Diagnosis>,
+    /// What was tried in place of the present model, fitted, with its error.
+    tried: Vec<(f64, Model)>,
 }
 
 impl State {
@@ -156,6 +158,7 @@ impl State {
             before: None,
             steps: Vec::new(),
             diagnoses: Vec::new(),
+            tried: Vec::new(),
         }
     }
 
@@ -219,13 +222,15 @@ impl State {
         work: &Work<'_>,
     ) -> Result<bool, FitError> {
         self.step(best, round, work);
-        let stays = refine(
+        let tried = refine(
             &mut self.present,
             &mut self.steps,
             &self.diagnoses[..round],
             measurements,
             &work.in_round(round),
         )?;
+        let stays = tried.is_some();
+        self.tried = tried.unwrap_or_default();
         Ok(stays || !self.take_back())
     }
 
@@ -236,7 +241,8 @@ impl State {
         measurements: &Measurements<'_>,
         work: &Work<'_>,
     ) -> Result<(), FitError> {
-        let open = still_open(model, &self.steps, &self.diagnoses, measurements, work)?;
+        let (steps, tried) = (&self.steps, &self.tried);
+        let open = still_open(model, steps, &self.diagnoses, tried, measurements, work)?;
         for (step, open) in self.steps.iter_mut().zip(open) {
             step.still_open = open;
         }

@@ -122,6 +122,7 @@ mod problem;
 mod progress;
 mod promise;
 mod refine;
+mod refined;
 mod regression;
 mod residual_force;
 mod rls;

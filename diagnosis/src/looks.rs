@@ -10,7 +10,7 @@ use crate::early::{Finding, Promised, TOLD};
 use crate::explain::place;
 use crate::judge::nrmse;
 use crate::progress::Stage;
-use crate::promise::Promises;
+use crate::promise::{Promise, Promises};
 use crate::search::{Search, least};
 use crate::starts::{first_starts, fresh_starts, starts_from};
 use crate::trial::{Judged, look};
@@ -23,8 +23,8 @@ const FIRST_LOOKS: usize = 2;
 /// A candidate by its index, and where to start it from.
 type Attempt = (usize, Vec<f64>);
 
-/// The cost that an attempt promises, and the attempt.
-type Promising = (f64, Attempt);
+/// What an attempt promises, and the attempt.
+type Promising = (Promise, Attempt);
 
 /// The attempts of some that were promising.
 fn attempts(of: impl Iterator<Item = Promising>) -> Vec<Attempt> {
@@ -141,13 +141,29 @@ impl Search<'_> {
         plain - self.criteria().beside * (plain - best)
     }
 
-    /// Whether a candidate that promises a `cost` has nothing to do with what is missing: the best of those `looked` at
-    /// explains the log, and of what that one explains it promises to explain next to nothing. One that promises to do worse
-    /// than the plain model starts too far from it to tell.
-    fn is_beside(&self, cost: f64, looked: &Looked) -> bool {
-        self.tells(cost)
+    /// Whether a candidate with a `promise` has nothing to do with what is missing: the best of those `looked` at
+    /// explains the log, and of what that one explains it promises to explain next to nothing; or nothing is missing. One
+    /// that promises to do worse than the plain model starts too far from it to tell.
+    fn is_beside(&self, promise: Promise, looked: &Looked) -> bool {
+        let of_best = self.tells(promise.cost)
             && self.is_explained(looked.error())
-            && cost > self.beside(self.nominal.cost, looked.cost)
+            && promise.cost > self.beside(self.nominal.cost, looked.cost);
+        let shown = looked.attempts.len() >= MOST_PROMISING;
+        of_best || shown && self.is_needless(promise)
+    }
+
+    /// Whether nothing is missing, and a `promise` gives no reason to think otherwise.
+    fn is_needless(&self, promise: Promise) -> bool {
+        self.worth_trying().is_some_and(|most| promise.left > most)
+    }
+
+    /// Where the plain model leaves hardly more than noise, what anything that is worth trying may leave of its cost: it
+    /// explains its share of the part of that noise that an effect must explain to matter.
+    pub(crate) fn worth_trying(&self) -> Option<f64> {
+        let missing = &self.work.criteria().missing;
+        let floors = nrmse(self.nominal.rank) / self.nominal.floor;
+        let matters = (missing.matters / floors).powi(2);
+        (floors <= missing.complete).then(|| self.beside(1.0, 1.0 - matters))
     }
 
     /// Whether a promised `cost` tells anything.
@@ -199,7 +215,8 @@ impl Search<'_> {
             starts.partition(|(i, _)| !(0..self.all.len()).any(|j| self.is_part(*i, j)));
         let (done, of) = (AtomicU64::new(0), (whole.len() + parts.len()) as u64);
         self.work.tell(Stage::Promises, 0, of);
-        let promises = Promises::new(self.nominal);
+        let at_floor = self.worth_trying().is_some();
+        let promises = Promises::new(self.nominal, at_floor);
         let promised = |attempts: Vec<Attempt>| -> Vec<Promising> {
             let each = attempts.into_par_iter().filter_map(|(i, start)| {
                 let promise = promises.of(&self.all[i].chosen(&start), &start);
@@ -217,12 +234,18 @@ impl Search<'_> {
         let promised_by = |j: usize, start: &[f64]| {
             let of = || all.iter().filter(move |(_, (i, _))| *i == j);
             let same = of().find(|(_, (_, other))| other == start);
-            let best = || of().min_by(|a, b| a.0.total_cmp(&b.0));
-            same.or_else(best).map(|(cost, _)| *cost)
+            let best = || of().min_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
+            same.or_else(best).map(|(promise, _)| *promise)
         };
         let explained = |(best, error)| self.is_explained(error) && self.acts_on_both_sides(best);
-        if looked.best().is_some_and(explained) {
-            let idle = |cost: f64| !self.tells(cost) || self.is_beside(cost, looked);
+        let nothing = at_floor
+            && all
+                .iter()
+                .all(|(p, _)| p.left == 0.0 || self.is_needless(*p));
+        if nothing || looked.best().is_some_and(explained) {
+            let idle = |promise: Promise| {
+                nothing || !self.tells(promise.cost) || self.is_beside(promise, looked)
+            };
             parts.retain(|(i, start)| {
                 let whole = (0..self.all.len()).filter(|j| self.is_part(*i, *j));
                 let mut whole = whole.filter(|j| self.acts_on_both_sides(*j));
@@ -269,8 +292,8 @@ impl Search<'_> {
 
     /// The most promising of `all`, the best first.
     fn best_of(&self, mut all: Vec<Promising>) -> Vec<Promising> {
-        all.retain(|(cost, _)| cost.is_finite());
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all.retain(|(promise, _)| promise.cost.is_finite());
+        all.sort_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
         let criteria = self.criteria();
         // An effect with many starts must not crowd the others out.
         let mut taken = vec![0; self.all.len()];
@@ -286,7 +309,7 @@ impl Search<'_> {
     fn promised(&self, promising: &[Promising]) -> Finding {
         let mut seen = BTreeSet::new();
         let candidates = (promising.iter())
-            .map(|(cost, (i, _))| (cost, &self.all[*i]))
+            .map(|(promise, (i, _))| (promise.cost, &self.all[*i]))
             .filter(|(_, candidate)| seen.insert(candidate.meta.id))
             .take(TOLD)
             .map(|(cost, candidate)| Promised {

@@ -8,11 +8,19 @@
 //! by the parameters of the plain model. Of these `W` is one of a few columns for every start. `J₀` is that of the plain
 //! model at its solution, which all candidates share: a candidate has hardly moved the machine away from there, and
 //! the promise only ranks it. So a promise costs one simulation with one or two derivatives, and not with eight.
+//!
+//! Steps are long here, and a start may be too strong, so a promise is wrong by some per cent. That ranks candidates, but
+//! does not say that one explains nothing. There the residuals `r₀` of the plain model are held against everything that the
+//! candidate could do to them, at any strength, simulated with the same long steps:
+//!
+//! ```text
+//! left = min ‖r₀ + J [δ w α]ᵀ‖² / min ‖r₀ + J₀ δ‖²        J = [J₀ W r - r₀]
+//! ```
 
 use std::sync::OnceLock;
 
 use loopsight_model::model::pseudo_inverse;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::candidates::Candidate;
 use crate::gram::gram;
@@ -25,9 +33,20 @@ use crate::trial::{LOOK_STEPS, Nominal, coarse, positions};
 /// look, because a long step could skip a cog.
 const PROMISE_STEPS: f64 = 4.0;
 
+/// What a candidate promises from one start.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Promise {
+    /// The cost after one Gauss–Newton step; infinite where it promises nothing.
+    pub(crate) cost: f64,
+    /// The share that it must leave of what the plain model leaves; 0 where that is not known.
+    pub(crate) left: f64,
+}
+
 /// The promises of candidates.
 pub(crate) struct Promises<'a> {
     nominal: &'a Nominal<'a>,
+    /// Whether to ask what candidates must leave.
+    finely: bool,
     /// The plain model linearised: at simulated positions and at measured ones, with signs as they are and widely
     /// smoothed. Each is made when the first candidate needs it.
     plain: [OnceLock<Option<Linear>>; 4],
@@ -38,6 +57,8 @@ struct Linear {
     positions: Option<Positions>,
     /// Weights of the first samples, where initial states are estimated.
     first: Vec<Vec<f64>>,
+    /// `r₀`
+    residual: DVector<f64>,
     /// `J₀`
     jacobian: DMatrix<f64>,
     /// `J₀ᵀJ₀`
@@ -45,15 +66,17 @@ struct Linear {
 }
 
 impl<'a> Promises<'a> {
-    pub(crate) fn new(nominal: &'a Nominal<'a>) -> Self {
+    /// Those beside the plain model; `finely` also says what each must leave.
+    pub(crate) fn new(nominal: &'a Nominal<'a>, finely: bool) -> Self {
         Self {
             nominal,
+            finely,
             plain: Default::default(),
         }
     }
 
-    /// The cost that a candidate promises, from one start; infinite where it promises nothing. None where its simulation fails.
-    pub(crate) fn of(&self, candidate: &Candidate, start: &[f64]) -> Option<f64> {
+    /// What a candidate promises from one start. None where its simulation fails.
+    pub(crate) fn of(&self, candidate: &Candidate, start: &[f64]) -> Option<Promise> {
         let nominal = self.nominal;
         nominal.work.go_on().ok()?;
         let plain = nominal.cost;
@@ -82,25 +105,29 @@ impl<'a> Promises<'a> {
         };
         let mut problem = nominal.problem(&model, known)?;
         problem.positions = at;
-        let (before, after) = match linear {
-            Some(linear) => linear.promise(&mut problem, start)?,
-            None => problem.promise(start, states).ok()??,
+        let (before, after, left) = match linear {
+            Some(linear) => linear.promise(&mut problem, start, self.finely)?,
+            None => {
+                let (before, after) = problem.promise(start, states).ok()??;
+                (before, after, 0.0)
+            }
         };
         let criteria = nominal.criteria();
-        match shape {
+        let cost = match shape {
             // At the measured positions the plain model, too, leaves less than in its free run. Where it leaves
             // hardly anything, the regression tells nothing.
             Some(_) => {
                 let promising =
                     after < criteria.promising * before || before < criteria.told * plain;
-                Some(if promising {
+                if promising {
                     plain * after / before
                 } else {
                     f64::INFINITY
-                })
+                }
             }
-            None => Some(after),
-        }
+            None => after,
+        };
+        Some(Promise { cost, left })
     }
 
     /// The plain model linearised as the candidate at this start needs it. None where it starts from elsewhere, or is no
@@ -136,25 +163,46 @@ impl<'a> Promises<'a> {
         let mut problem = nominal.problem(&model, nominal.held)?;
         problem.positions = at.cloned();
         let there = problem.pack(values, states);
-        let jacobian = problem.linearise_once(&there).ok()?.jacobian;
-        let gram = gram(&jacobian);
+        let linear = problem.linearise_once(&there).ok()?;
+        let gram = gram(&linear.jacobian);
         gram.iter().all(|v| v.is_finite()).then(|| Linear {
             positions: at.cloned(),
             first: problem.first.clone(),
-            jacobian,
+            residual: linear.residual,
+            jacobian: linear.jacobian,
             gram,
         })
     }
 }
 
 impl Linear {
-    /// Cost at the start of a candidate, whose own parameters are the unknowns of `problem`, and the one that a full
-    /// Gauss–Newton step of all parameters would reach if the model were linear in them.
-    fn promise(&self, problem: &mut Problem<'_>, start: &[f64]) -> Option<(f64, f64)> {
+    /// Cost at the start of a candidate, whose own parameters are the unknowns of `problem`, the one that a full
+    /// Gauss–Newton step of all parameters would reach if the model were linear in them, and the share that it must leave:
+    /// 0 where nobody asks `finely`.
+    fn promise(
+        &self,
+        problem: &mut Problem<'_>,
+        start: &[f64],
+        finely: bool,
+    ) -> Option<(f64, f64, f64)> {
         problem.first.clone_from(&self.first);
         // What is known is no unknown.
         let linear = problem.linearise(&problem.pack(start, &[])).ok()?;
         let (residual, own) = (&linear.residual, &linear.jacobian);
+        let after = self.after(residual, own)?;
+        let left = || {
+            let many = own.ncols();
+            let mut all = own.clone().resize_horizontally(many + 1, 0.0);
+            all.set_column(many, &(residual - &self.residual));
+            let none = DMatrix::zeros(all.nrows(), 0);
+            Some(self.after(&self.residual, &all)? / self.after(&self.residual, &none)?)
+        };
+        let left = if finely { left().unwrap_or(0.0) } else { 0.0 };
+        Some((residual.norm_squared(), after, left))
+    }
+
+    /// What is left of the square of `residual` by the best sum of the plain model's derivatives and its `own`.
+    fn after(&self, residual: &DVector<f64>, own: &DMatrix<f64>) -> Option<f64> {
         let (n, m) = (self.gram.ncols(), own.ncols());
         let mut gram = self.gram.clone().resize(n + m, n + m, 0.0);
         let across = self.jacobian.tr_mul(own);
@@ -163,9 +211,8 @@ impl Linear {
         gram.view_mut((n, n), (m, m)).copy_from(&own.tr_mul(own));
         let mut right = self.jacobian.tr_mul(residual).resize_vertically(n + m, 0.0);
         right.rows_mut(n, m).copy_from(&own.tr_mul(residual));
-        let before = residual.norm_squared();
-        let after = before - right.dot(&(pseudo_inverse(&gram)? * &right));
-        after.is_finite().then_some((before, after.max(0.0)))
+        let after = residual.norm_squared() - right.dot(&(pseudo_inverse(&gram)? * &right));
+        after.is_finite().then_some(after.max(0.0))
     }
 }
 
@@ -208,19 +255,20 @@ mod tests {
             |model| Problem::with(model, &runs, None, Some(states.clone()), Work::quiet()).unwrap();
         let of_plain = problem(&plain);
         let at = of_plain.pack(&plain.values(), &states);
-        let jacobian = of_plain.linearise_once(&at).unwrap().jacobian;
+        let there = of_plain.linearise_once(&at).unwrap();
         let linear = Linear {
             positions: None,
             first: Vec::new(),
-            gram: jacobian.tr_mul(&jacobian),
-            jacobian,
+            gram: there.jacobian.tr_mul(&there.jacobian),
+            residual: there.residual,
+            jacobian: there.jacobian,
         };
         let mut own = with.clone();
         for parameter in &mut own.parameters[..plain.parameters.len()] {
             parameter.free = false;
         }
         let start = with.values();
-        let shared = linear.promise(&mut problem(&own), &start).unwrap();
+        let shared = linear.promise(&mut problem(&own), &start, true).unwrap();
         let whole = problem(&with).promise(&start, &states).unwrap().unwrap();
         assert!(
             (shared.0 / whole.0 - 1.0).abs() < 1e-9,
@@ -231,5 +279,17 @@ mod tests {
             "{shared:?} {whole:?}"
         );
         assert!(shared.1 < 0.1 * shared.0, "{shared:?}");
+        // A start without influence adds nothing to what the derivatives can do.
+        let none = DMatrix::zeros(linear.residual.len(), 0);
+        let of_plain = linear.after(&linear.residual, &none).unwrap();
+        assert!(
+            (shared.2 * of_plain / shared.1 - 1.0).abs() < 1e-6,
+            "{shared:?} {of_plain}"
+        );
+
+        // Four times as strong as the friction is, it could still explain a third of what is left.
+        let strong = [&plain.values()[..], &[3.2, 0.5]].concat();
+        let strong = linear.promise(&mut problem(&own), &strong, true).unwrap();
+        assert!(strong.2 < 0.67, "{strong:?}");
     }
 }

@@ -13,9 +13,8 @@ use crate::estimate::{Estimate, ParameterVerdict, strength_is_determined};
 use crate::fitted::Fit;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
-use crate::output_error::fitted_values;
-use crate::progress::{Cancelled, Stage, Work};
-use crate::solve::Effort;
+use crate::progress::Work;
+use crate::refined::{Refined, refitted};
 use crate::split::split;
 use crate::suited::smooth;
 
@@ -28,41 +27,59 @@ use crate::suited::smooth;
 ///   then;
 /// * the sign of the last effect is made sharper while the error falls.
 ///
-/// The steps are changed with the model. If the work is cancelled, the two still agree. False where the last step is no
-/// more than another name for an earlier one; then nothing is changed.
+/// The steps are changed with the model. If the work is cancelled, the two still agree. None where the last step is no
+/// more than another name for an earlier one; then nothing is changed. Otherwise what was tried in place of the model that
+/// remains: each fitted, with its error.
 pub(crate) fn refine(
     model: &mut Model,
     steps: &mut Vec<ImprovementStep>,
     diagnoses: &[Diagnosis],
     measurements: &Measurements<'_>,
     work: &Work<'_>,
-) -> Result<bool, FitError> {
-    let mut best = Refined {
-        model,
-        error: None,
-        measurements,
-        work,
-        changes: 0,
-    };
+) -> Result<Option<Vec<(f64, Model)>>, FitError> {
+    let mut best = Refined::new(model, measurements, work);
+    // Mostly nothing is taken, so that what the next stages try is known.
+    let fewer = with_fewer(best.model, steps);
+    best.try_all(&fewer)?;
     if !needless(&mut best, steps)? {
-        return Ok(false);
+        return Ok(None);
     }
     simplified(&mut best, steps)?;
     split(&mut best, steps)?;
+    let others = with_others(best.model, steps, diagnoses);
+    best.try_all(&others)?;
     reconsidered(&mut best, steps, diagnoses)?;
     sharpened(&mut best)?;
-    Ok(true)
+    Ok(Some(best.fitted()))
+}
+
+/// The models without an effect, or with a simpler one. (What one may be split into is much, and comes last.)
+fn with_fewer(model: &Model, steps: &[ImprovementStep]) -> Vec<Model> {
+    let mut all: Vec<Model> = models(spared(model, steps)).collect();
+    for place in steps.iter().filter_map(|step| step.added.as_ref()) {
+        all.extend(models(simpler(model, place)));
+    }
+    all
+}
+
+/// The models with a twin in place of an effect, or with a sharper sign.
+fn with_others(model: &Model, steps: &[ImprovementStep], diagnoses: &[Diagnosis]) -> Vec<Model> {
+    let twins = |step| models(twins_in(model, step, diagnoses));
+    let all = steps.iter().flat_map(twins);
+    // The sharper sign takes longest.
+    sharper(model).into_iter().chain(all).collect()
+}
+
+/// The models of some candidates.
+fn models<T>(candidates: Vec<(T, Model)>) -> impl Iterator<Item = Model> {
+    candidates.into_iter().map(|(_, model)| model)
 }
 
 /// The models without one of the earlier steps' effects, by the index of the step.
-fn spared(best: &Refined<'_>, steps: &[ImprovementStep]) -> Vec<(usize, Model)> {
+fn spared(model: &Model, steps: &[ImprovementStep]) -> Vec<(usize, Model)> {
     // The last effect was just found missing, so it stays.
     let earlier = steps.iter().enumerate().take(steps.len().saturating_sub(1));
-    let models = earlier.filter_map(|(index, step)| {
-        let instances = instances(best.model, step.added.as_ref()?);
-        instances.first()?;
-        Some((index, without(best.model, &instances)?))
-    });
+    let models = earlier.filter_map(|(index, step)| Some((index, without_step(model, step)?)));
     models.collect()
 }
 
@@ -79,7 +96,7 @@ fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<
         _ => false,
     };
     let all = best.model.clone();
-    while let Some(index) = best.takes(spared(best, steps), |_| close)? {
+    while let Some(index) = best.takes(spared(best.model, steps), |_| close)? {
         if hardly {
             *best.model = all;
             return Ok(false);
@@ -172,24 +189,30 @@ pub(crate) fn free(model: &Model) -> usize {
 fn simplified(best: &mut Refined<'_>, steps: &mut [ImprovementStep]) -> Result<(), FitError> {
     let criteria = &best.work.criteria().choice;
     for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
-        let instances = instances(best.model, place);
-        let Some(effect) = instances.first().map(|i| &best.model.effects[*i]) else {
-            continue;
-        };
-        let simpler = effect.meta.simpler.iter().filter_map(|id| {
-            let candidate = instances.iter().try_fold(best.model.clone(), |model, i| {
-                let at: Vec<&str> = model.effects[*i].at.iter().map(|c| c.id).collect();
-                model.with_effect_replaced(*i, id, &at)
-            });
-            Some((*id, candidate?))
-        });
         let many = free(best.model);
         let share = |model: &Model| criteria.allowance(many, free(model));
-        if let Some(id) = best.takes(simpler.collect(), share)? {
+        if let Some(id) = best.takes(simpler(best.model, place), share)? {
             id.clone_into(&mut place.effect);
         }
     }
     Ok(())
+}
+
+/// The models with a simpler effect in place of the one at `place`, by its id.
+fn simpler(model: &Model, place: &EffectAt) -> Vec<(&'static str, Model)> {
+    let instances = instances(model, place);
+    let Some(effect) = instances.first().map(|i| &model.effects[*i]) else {
+        return Vec::new();
+    };
+    let ids = effect.meta.simpler.iter();
+    let models = ids.filter_map(|id| {
+        let candidate = instances.iter().try_fold(model.clone(), |model, i| {
+            let at: Vec<&str> = model.effects[*i].at.iter().map(|c| c.id).collect();
+            model.with_effect_replaced(*i, id, &at)
+        });
+        Some((*id, candidate?))
+    });
+    models.collect()
 }
 
 /// Replaces an added effect by one that the data could not tell from it at first, where the error falls: once
@@ -203,29 +226,38 @@ fn reconsidered(
     let better = criteria.improve.better;
     let floor = diagnoses.last().map_or(0.0, |d| d.floor.nrmse);
     for step in steps {
-        let others = twins(step, diagnoses);
-        let Some(place) = step.added.as_mut() else {
+        let Some(place) = step.added.as_ref() else {
             continue;
         };
-        let (narrower, others): (Vec<_>, Vec<_>) = others
-            .into_iter()
-            .partition(|other| is_narrower(other, place));
+        let twins = twins_in(best.model, step, diagnoses).into_iter();
+        let (narrower, others): (Vec<_>, Vec<_>) =
+            twins.partition(|(twin, _)| is_narrower(twin, place));
         for (others, most) in [
             (others, f64::INFINITY),
             // At one side it also stands for whatever else makes the sides differ, while that is missing.
             (narrower, criteria.missing.above_floor * floor),
         ] {
-            let candidates = others.into_iter();
-            let candidates = candidates
-                .filter_map(|other| Some((other, exchanged(best.model, place, other)?)))
-                .collect();
-            if let Some(other) = best.takes_below(candidates, |_| better, most)? {
-                *place = other.clone();
+            if let Some(other) = best.takes_below(others, |_| better, most)? {
+                step.added = Some(other.clone());
                 break;
             }
         }
     }
     Ok(())
+}
+
+/// The models with a [twin](twins) in place of the effect of a `step`.
+fn twins_in<'d>(
+    model: &Model,
+    step: &ImprovementStep,
+    diagnoses: &'d [Diagnosis],
+) -> Vec<(&'d EffectAt, Model)> {
+    let Some(place) = step.added.as_ref() else {
+        return Vec::new();
+    };
+    let twins = twins(step, diagnoses).into_iter();
+    let models = twins.filter_map(|twin| Some((twin, exchanged(model, place, twin)?)));
+    models.collect()
 }
 
 /// Whether an effect is another one at fewer of its places.
@@ -238,22 +270,22 @@ fn is_narrower(this: &EffectAt, other: &EffectAt) -> bool {
 /// with one in its place, the finished `model`, as that diagnosis fitted it or fitted again, is about as good. Its error then
 /// is not larger by more than the ratio `improve.better`, which also makes [`refine`] exchange effects. A twin that no longer
 /// fits into the model is left out.
+///
+/// Those that were `tried` in the last [`refine`], with the other effects that the model still has, are not fitted again.
 pub(crate) fn still_open(
     model: &Model,
     steps: &[ImprovementStep],
     diagnoses: &[Diagnosis],
+    tried: &[(f64, Model)],
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<Vec<Vec<EffectAt>>, FitError> {
-    let candidates: Vec<((usize, &EffectAt), Model)> = steps
+    let candidates: Vec<(usize, &EffectAt, Model)> = steps
         .iter()
         .enumerate()
-        .filter_map(|(index, step)| Some((index, step.added.as_ref()?, twins(step, diagnoses))))
-        .flat_map(|(index, place, twins)| twins.into_iter().map(move |twin| (index, place, twin)))
-        .filter_map(|(index, place, twin)| {
-            let exchanged = exchanged(model, place, twin)?;
-            let known = diagnosed(&steps[index], diagnoses, twin, &exchanged);
-            Some(((index, twin), known.unwrap_or(exchanged)))
+        .flat_map(|(index, step)| {
+            let twins = twins_in(model, step, diagnoses).into_iter();
+            twins.map(move |(twin, exchanged)| (index, twin, exchanged))
         })
         .collect();
     let mut open = vec![Vec::new(); steps.len()];
@@ -268,40 +300,45 @@ pub(crate) fn still_open(
         Err(_) => return Ok(open),
         Ok(error) => error / work.criteria().improve.better,
     };
-    let good = |model: &Model| {
+    let leaves = |model: &Model| free_run_error(model, &judging, &silent);
+    let good = |(index, twin, exchanged): &(usize, &EffectAt, Model)| {
+        let same = |model: &Model| has_the_effects_of(model, exchanged);
+        if let Some((error, _)) = tried.iter().find(|(_, model)| same(model)) {
+            return *error <= bar;
+        }
+        let diagnosed = diagnosed(&steps[*index], diagnoses, twin).filter(|model| same(model));
         // One that a diagnosis fitted needs no other fit.
-        let begins = free_run_error(model, &judging, &silent);
-        begins.is_ok_and(|error| error <= bar)
-            || refitted(model, measurements, &silent).is_ok_and(|(error, _)| error <= bar)
+        diagnosed.is_some_and(|model| leaves(model).is_ok_and(|error| error <= bar))
+            || refitted(diagnosed.unwrap_or(exchanged), measurements, &silent)
+                .is_ok_and(|(error, _)| error <= bar)
     };
-    let found: Vec<_> = (candidates.into_par_iter())
-        .filter(|(_, model)| good(model))
-        .map(|(of, _)| of)
-        .collect();
+    let found: Vec<_> = candidates.into_par_iter().filter(good).collect();
     // After a cancellation some were not tried.
     work.go_on()?;
-    for (index, twin) in found {
+    for (index, twin, _) in found {
         open[index].push(twin.clone());
     }
     Ok(open)
 }
 
-/// The model that the diagnosis of a `step` fitted with the `twin` of its effect, where it has the effects of `exchanged`:
-/// nothing else was changed since.
-fn diagnosed(
+/// The model that the diagnosis of a `step` fitted with the `twin` of its effect.
+fn diagnosed<'d>(
     step: &ImprovementStep,
-    diagnoses: &[Diagnosis],
+    diagnoses: &'d [Diagnosis],
     twin: &EffectAt,
-    exchanged: &Model,
-) -> Option<Model> {
+) -> Option<&'d Model> {
     let candidates = &diagnoses.get(step.round?)?.candidates;
+    let twin = candidates.iter().find(|c| c.place == *twin)?;
+    Some(&twin.model)
+}
+
+/// Whether two models have the same effects, with as many parameters that are fitted.
+fn has_the_effects_of(model: &Model, other: &Model) -> bool {
     let effects = |model: &Model| -> BTreeSet<(&str, Vec<&str>)> {
         let of = |effect: &Attached| (effect.meta.id, effect.at.iter().map(|c| c.id).collect());
         model.effects.iter().map(of).collect()
     };
-    let model = &candidates.iter().find(|c| c.place == *twin)?.model;
-    let same = effects(model) == effects(exchanged) && free(model) == free(exchanged);
-    same.then(|| model.clone())
+    effects(model) == effects(other) && free(model) == free(other)
 }
 
 /// What the data could not tell from the effect of a step when it was added.
@@ -337,66 +374,6 @@ fn exchanged(model: &Model, place: &EffectAt, other: &EffectAt) -> Option<Model>
     Some(candidate)
 }
 
-/// A model, and others that may take its place.
-pub(crate) struct Refined<'a> {
-    pub(crate) model: &'a mut Model,
-    /// Its error, once it was computed.
-    error: Option<f64>,
-    pub(crate) measurements: &'a Measurements<'a>,
-    pub(crate) work: &'a Work<'a>,
-    /// Changes that were tried.
-    changes: u64,
-}
-
-impl Refined<'_> {
-    /// Takes the best of the fitted `candidates` whose error is below their `share` of the present one. Candidates
-    /// that cannot be fitted, because their free run diverges, do not count.
-    pub(crate) fn takes<T: Send>(
-        &mut self,
-        candidates: Vec<(T, Model)>,
-        share: impl Fn(&Model) -> f64 + Sync,
-    ) -> Result<Option<T>, FitError> {
-        self.takes_below(candidates, share, f64::INFINITY)
-    }
-
-    /// As [`Refined::takes`], of those whose error is at `most` so large.
-    fn takes_below<T: Send>(
-        &mut self,
-        candidates: Vec<(T, Model)>,
-        share: impl Fn(&Model) -> f64 + Sync,
-        most: f64,
-    ) -> Result<Option<T>, FitError> {
-        if candidates.is_empty() {
-            return Ok(None);
-        }
-        self.changes += candidates.len() as u64;
-        self.work.tell(Stage::Refining, self.changes, self.changes);
-        let silent = self.work.silently();
-        let (now, fitted) = rayon::join(
-            || match self.error {
-                Some(now) => Ok(now),
-                // Any other model is better than one whose free run diverges.
-                None => match refitted(self.model, self.measurements, &silent) {
-                    Err(FitError::Cancelled(cancelled)) => Err(cancelled),
-                    found => Ok(found.map_or(f64::INFINITY, |(error, _)| error)),
-                },
-            },
-            || all_refitted(candidates, self.measurements, &silent),
-        );
-        let now = now?;
-        self.error = Some(now);
-        let good = |model: &Model, error: f64| error <= (share(model) * now).min(most);
-        let best = (fitted?.into_iter())
-            .filter(|(_, error, model)| good(model, *error))
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        Ok(best.map(|(what, error, model)| {
-            *self.model = model;
-            self.error = Some(error);
-            what
-        }))
-    }
-}
-
 /// Indices of a step's effect in `model`: one, or one for each of its channels; none when another effect has
 /// replaced it.
 pub(crate) fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
@@ -408,43 +385,6 @@ pub(crate) fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
         .collect()
 }
 
-/// The `candidates` after a short fit each, with their errors, in their order. Those that cannot be fitted, because their free
-/// run diverges, are not among them.
-fn all_refitted<T: Send>(
-    candidates: Vec<(T, Model)>,
-    measurements: &Measurements<'_>,
-    work: &Work<'_>,
-) -> Result<Vec<(T, f64, Model)>, Cancelled> {
-    let refit = |(what, model)| {
-        let (error, model) = refitted(&model, measurements, work).ok()?;
-        Some((what, error, model))
-    };
-    let fitted = candidates.into_par_iter().filter_map(refit).collect();
-    // After a cancellation some were not tried.
-    work.go_on()?;
-    Ok(fitted)
-}
-
-/// Effort of a short fit: errors are compared that differ by percents. (With a tolerance of 1e-4 the present model, where it
-/// converges slowly, ends so much higher that a simpler one takes its place.)
-const CORRECTION: Effort = Effort {
-    iterations: 20,
-    tolerance: 1e-6,
-    worth: None,
-};
-
-/// The error of a model after a short fit, and the fitted model.
-pub(crate) fn refitted(
-    model: &Model,
-    measurements: &Measurements<'_>,
-    work: &Work<'_>,
-) -> Result<(f64, Model), FitError> {
-    let fitted = fitted_values(model, measurements.runs, CORRECTION, work)?;
-    let judging = Measurements::new(measurements.judging());
-    let error = free_run_error(&fitted, &judging, work)?;
-    Ok((error, fitted))
-}
-
 /// Most halvings.
 const HALVINGS: usize = 3;
 
@@ -452,24 +392,27 @@ const HALVINGS: usize = 3;
 fn sharpened(best: &mut Refined<'_>) -> Result<(), FitError> {
     let criteria = &best.work.criteria().improve;
     for _ in 0..HALVINGS {
-        let mut candidate = best.model.clone();
-        let Some(effect) = candidate.effects.last() else {
+        let Some(candidate) = sharper(best.model) else {
             break;
         };
-        let (meta, first) = (effect.meta, effect.first_parameter);
-        let added = candidate.effects.iter().rev();
-        let count = added.take_while(|e| e.meta.id == meta.id).count();
-        let width = (0..meta.parameters.len())
-            .find(|i| meta.parameters[*i].is_width())
-            .and_then(|i| candidate.parameters[first + i].value);
-        let Some(width) = width else { break };
-        smooth(&mut candidate, count, 0.5 * width);
-        if best
-            .takes(vec![((), candidate)], |_| criteria.sharper)?
-            .is_none()
-        {
+        let taken = best.takes(vec![((), candidate)], |_| criteria.sharper)?;
+        if taken.is_none() {
             break;
         }
     }
     Ok(())
+}
+
+/// The model with half the smoothing width of the effect added last; none where that has none.
+fn sharper(model: &Model) -> Option<Model> {
+    let mut candidate = model.clone();
+    let effect = candidate.effects.last()?;
+    let (meta, first) = (effect.meta, effect.first_parameter);
+    let added = candidate.effects.iter().rev();
+    let count = added.take_while(|e| e.meta.id == meta.id).count();
+    let width = (0..meta.parameters.len())
+        .find(|i| meta.parameters[*i].is_width())
+        .and_then(|i| candidate.parameters[first + i].value)?;
+    smooth(&mut candidate, count, 0.5 * width);
+    Some(candidate)
 }

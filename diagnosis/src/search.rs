@@ -114,13 +114,14 @@ impl Search<'_> {
         let of = contest.len() as u64;
         let done = AtomicU64::new(0);
         self.work.tell(Stage::Finalists, 0, of);
-        let most = self.most_promised(least(contest.iter()));
+        let any = (self.worth_trying()).map_or(f64::INFINITY, |left| left * self.nominal.cost);
+        let most = any.min(self.most_promised(least(contest.iter())));
         let mut finalists: Vec<(Judged, Explanation)> = contest
             .par_iter()
             .enumerate()
             .filter_map(|(k, first)| {
                 let spared = k >= self.criteria().finalists_at_least;
-                let most = if spared { most } else { f64::INFINITY };
+                let most = if spared { most } else { any };
                 let found = self.finished(first.clone(), most);
                 if let Some((_, explanation)) = &found {
                     self.work.know(|| Finding::Finalist(explanation.into()));
@@ -357,6 +358,31 @@ mod tests {
                 let most = search.most_promised(least) / plain;
                 assert!((most - share).abs() < 1e-12, "{least}: {most}");
             }
+        });
+    }
+
+    /// A tenth of what matters, which is two tenths of the noise; where more is left than noise, anything may be missing.
+    #[test]
+    fn at_the_floor_an_effect_must_promise_what_would_matter() {
+        search(&axis(START, ""), 1.0, |search| {
+            let left = |floors: f64| {
+                let floor = nrmse(search.nominal.rank) / floors;
+                let nominal = Nominal {
+                    floor,
+                    ..*search.nominal
+                };
+                let at_floor = Search {
+                    nominal: &nominal,
+                    ..*search
+                };
+                at_floor.worth_trying()
+            };
+            for (floors, gains) in [(1.0, 0.1 * 0.04), (0.5, 0.1 * 0.16), (0.1, 0.1 * 4.0)] {
+                let left = left(floors).unwrap();
+                assert!((1.0 - left - gains).abs() < 1e-12, "{floors}: {left}");
+            }
+            assert_eq!(left(1.21), None);
+            assert_eq!(left(f64::NAN), None);
         });
     }
 }

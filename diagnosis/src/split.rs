@@ -11,7 +11,8 @@ use crate::effect_at::EffectAt;
 use crate::error::FitError;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
-use crate::refine::{Refined, free, instances, refitted, without_step};
+use crate::refine::{free, instances, without_step};
+use crate::refined::{Refined, refitted};
 
 /// Two effects in place of one: those of `first` and `second`, at its channels.
 struct Split {

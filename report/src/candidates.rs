@@ -1,6 +1,6 @@
 //! The explanations that were tried, best first, with the evidence for each.
 
-use loopsight_diagnosis::{Diagnosis, Estimate, Explanation};
+use loopsight_diagnosis::{Conclusion, Diagnosis, Estimate, Explanation};
 use loopsight_model::registry;
 
 use crate::bars::{Line, Scale};
@@ -27,11 +27,16 @@ pub(crate) fn lines(diagnosis: &Diagnosis) -> [Line; 2] {
     ]
 }
 
+/// Whether effects were tried. Where nothing is missing, it may be that none was worth a fit.
+pub(crate) fn were_tried(diagnosis: &Diagnosis) -> bool {
+    !diagnosis.candidates.is_empty() || diagnosis.verdict == Conclusion::NothingMissing
+}
+
 /// All explanations of a diagnosis.
 pub(crate) fn candidates(diagnosis: &Diagnosis) -> String {
     let all = &diagnosis.candidates;
     if all.is_empty() {
-        return "<p>No effect was tried.</p>\n".into();
+        return "<p>None promised to explain more than noise does.</p>\n".into();
     }
     let scale = Scale::new(
         all.iter().map(|c| c.nrmse),

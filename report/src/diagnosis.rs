@@ -49,7 +49,7 @@ pub fn diagnosis_page(
         names,
     ));
     body.push_str(&residual_force(diagnosis.residual_force.as_ref()));
-    if !diagnosis.candidates.is_empty() {
+    if candidates::were_tried(diagnosis) {
         body.push_str(&section(
             "What could be missing",
             CANDIDATES,

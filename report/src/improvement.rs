@@ -131,7 +131,7 @@ fn steps(steps: &[ImprovementStep], last: Option<&Diagnosis>) -> String {
 fn rounds(diagnoses: &[Diagnosis]) -> String {
     let tried: Vec<&Diagnosis> = diagnoses
         .iter()
-        .filter(|d| !d.candidates.is_empty())
+        .filter(|d| candidates::were_tried(d))
         .collect();
     let mut body = String::new();
     for (at, diagnosis) in tried.iter().enumerate() {

@@ -205,7 +205,7 @@ fn a_tank_that_runs_over_is_found_with_its_edge() {
 /// there, neither it nor anything else that acts before them is looked for.
 #[test]
 fn what_acts_before_a_measured_input_is_no_candidate() {
-    let log = log(&[(Hidden::DeadZone, 1.0)], Experiment::Prbs, 5);
+    let log = log(&[(Hidden::DeadZone, 1.0)], Experiment::MultiLevel, 5);
     let mut model = model(&log);
     model.log.inputs_measured = true;
     let measured = Measurements::new(std::slice::from_ref(&log.run));

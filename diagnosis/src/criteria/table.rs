@@ -115,7 +115,7 @@ criteria! {
         finalists_each: usize = 2 "1", Judgement: "one for all channels together, and one for the best channel";
         /// Candidates beyond this multiple of the least error after a short fit get no full fit. A short fit that cannot come below it is given up.
         behind: f64 = 3.0 "1", Judgement: "a short fit is only roughly right, but no worse than this";
-        /// Where a candidate explains the log, no other is tried that explains less than this share of what that one does. Beyond the first few, no full fit is made that promises less of what the best does.
+        /// Where a candidate explains the log, no other is tried that explains less than this share of what that one does. Beyond the first few, no full fit is made that promises less of what the best does. Where nothing is missing, none that promises less of what would matter.
         beside: f64 = 0.1 "1", Derived: "half of the least that any of 142 candidates promised which then came within a twentieth of the best; of 474 full fits, the least that one promised which came to 0.7 is 0.28";
         /// A candidate beyond this multiple of the least error is not extended to a larger one.
         worth_growing: f64 = 2.0 "1", Judgement: "a larger one would not make up for that";

@@ -1,0 +1,207 @@
+//! A model, and corrections to it that are tried.
+
+use loopsight_model::model::{Attached, Model};
+use rayon::prelude::*;
+
+use crate::compare::free_run_error;
+use crate::error::FitError;
+use crate::measurements::Measurements;
+use crate::output_error::fitted_values;
+use crate::progress::{Cancelled, Stage, Work};
+use crate::solve::Effort;
+
+/// A model, and others that may take its place.
+pub(crate) struct Refined<'a> {
+    pub(crate) model: &'a mut Model,
+    pub(crate) measurements: &'a Measurements<'a>,
+    pub(crate) work: &'a Work<'a>,
+    /// Its error after a short fit, once it was computed.
+    error: Option<f64>,
+    /// What was tried in its place.
+    tried: Vec<Tried>,
+    /// How many were tried so far.
+    changes: u64,
+}
+
+/// A model that was tried.
+struct Tried {
+    /// Where its fit began.
+    begun: Model,
+    /// Its error after a short fit, and itself then; none where it cannot be fitted.
+    fitted: Option<(f64, Model)>,
+}
+
+impl<'a> Refined<'a> {
+    /// One of which nothing was tried yet.
+    pub(crate) fn new(
+        model: &'a mut Model,
+        measurements: &'a Measurements<'a>,
+        work: &'a Work<'a>,
+    ) -> Self {
+        Self {
+            model,
+            measurements,
+            work,
+            error: None,
+            tried: Vec::new(),
+            changes: 0,
+        }
+    }
+
+    /// Takes the best of the fitted `candidates` whose error is below their `share` of the present one. Candidates
+    /// that cannot be fitted, because their free run diverges, do not count.
+    pub(crate) fn takes<T>(
+        &mut self,
+        candidates: Vec<(T, Model)>,
+        share: impl Fn(&Model) -> f64,
+    ) -> Result<Option<T>, FitError> {
+        self.takes_below(candidates, share, f64::INFINITY)
+    }
+
+    /// As [`Refined::takes`], of those whose error is at `most` so large.
+    pub(crate) fn takes_below<T>(
+        &mut self,
+        candidates: Vec<(T, Model)>,
+        share: impl Fn(&Model) -> f64,
+        most: f64,
+    ) -> Result<Option<T>, FitError> {
+        if candidates.is_empty() {
+            return Ok(None);
+        }
+        let (what, begun): (Vec<T>, Vec<Model>) = candidates.into_iter().unzip();
+        self.try_all(&begun)?;
+        let now = self.error.unwrap_or(f64::INFINITY);
+        let good = |model: &Model, error: f64| error <= (share(model) * now).min(most);
+        let best = (what.into_iter().zip(&begun))
+            .filter_map(|(what, begun)| Some((what, self.tried(begun)?.fitted.as_ref()?)))
+            .filter(|(_, (error, model))| good(model, *error))
+            .min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0));
+        let Some((what, (error, model))) = best else {
+            return Ok(None);
+        };
+        (self.error, *self.model) = (Some(*error), model.clone());
+        self.tried.clear();
+        Ok(Some(what))
+    }
+
+    /// Makes the short fits of those of some models that were not tried yet, and of the present one, all at once.
+    pub(crate) fn try_all(&mut self, models: &[Model]) -> Result<(), FitError> {
+        let new = models.iter().filter(|model| self.tried(model).is_none());
+        let new: Vec<Model> = new.cloned().collect();
+        if new.is_empty() {
+            return Ok(());
+        }
+        self.changes += new.len() as u64;
+        self.work.tell(Stage::Refining, self.changes, self.changes);
+        let silent = self.work.silently();
+        let refit = |model: &Model| -> Result<_, Cancelled> {
+            match refitted(model, self.measurements, &silent) {
+                Err(FitError::Cancelled(cancelled)) => Err(cancelled),
+                found => Ok(found.ok()),
+            }
+        };
+        let (present, known): (&Model, _) = (self.model, self.error);
+        let (now, tried) = rayon::join(
+            || match known {
+                Some(now) => Ok(now),
+                // Any other model is better than one whose free run diverges.
+                None => refit(present).map(|found| found.map_or(f64::INFINITY, |(error, _)| error)),
+            },
+            || {
+                let tried = new.into_par_iter().map(|begun| {
+                    let fitted = refit(&begun)?;
+                    Ok(Tried { begun, fitted })
+                });
+                tried.collect::<Result<Vec<Tried>, Cancelled>>()
+            },
+        );
+        self.error = Some(now?);
+        self.tried.extend(tried?);
+        Ok(())
+    }
+
+    /// A model that was tried in place of the present one.
+    fn tried(&self, begun: &Model) -> Option<&Tried> {
+        self.tried.iter().find(|tried| is_same(&tried.begun, begun))
+    }
+
+    /// What was tried in place of the present model: each fitted, with its error.
+    pub(crate) fn fitted(self) -> Vec<(f64, Model)> {
+        let fitted = self.tried.into_iter().filter_map(|tried| tried.fitted);
+        fitted.collect()
+    }
+}
+
+/// Whether two models that came of the same one are the same: their effects and parameters are.
+fn is_same(a: &Model, b: &Model) -> bool {
+    let alike = |(a, b): (&Attached, &Attached)| {
+        let at = |effect: &Attached| effect.at.iter().map(|c| c.id).collect::<Vec<_>>();
+        a.meta.id == b.meta.id && at(a) == at(b)
+    };
+    a.effects.len() == b.effects.len()
+        && a.effects.iter().zip(&b.effects).all(alike)
+        && a.parameters == b.parameters
+}
+
+/// Effort of a short fit: errors are compared that differ by percents. (With a tolerance of 1e-4 the present model, where it
+/// converges slowly, ends so much higher that a simpler one takes its place.)
+const CORRECTION: Effort = Effort {
+    iterations: 20,
+    tolerance: 1e-6,
+    worth: None,
+};
+
+/// The error of a model after a short fit, and the fitted model.
+pub(crate) fn refitted(
+    model: &Model,
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<(f64, Model), FitError> {
+    let fitted = fitted_values(model, measurements.runs, CORRECTION, work)?;
+    let judging = Measurements::new(measurements.judging());
+    let error = free_run_error(&fitted, &judging, work)?;
+    Ok((error, fitted))
+}
+
+#[cfg(test)]
+mod tests {
+    use loopsight_plants as _;
+
+    use super::*;
+    use crate::swing::swing;
+
+    fn axis(level: f64) -> Model {
+        let text = format!(
+            "[plant.dc_axis]\nK_A = -2.0\nK_C = 8.0\n[log.measured.speed]\n\
+             [[effect]]\n[effect.coulomb_friction]\nat = [\"shaft\"]\nlevel = {level}\n"
+        );
+        Model::from_toml("axis.toml", &text).unwrap().0
+    }
+
+    #[test]
+    fn what_was_tried_in_place_of_a_model_is_not_fitted_again() {
+        let runs = [swing(&axis(0.8), 400)];
+        let measurements = Measurements::new(&runs);
+        let work = Work::quiet();
+        let mut present = axis(0.8);
+        let without = present.without_effect(0).unwrap();
+        let candidates = || vec![("without", without.clone())];
+
+        let mut best = Refined::new(&mut present, &measurements, &work);
+        best.try_all(std::slice::from_ref(&without)).unwrap();
+        let once = work.simulated();
+        assert_eq!(best.takes(candidates(), |_| 1.01).unwrap(), None);
+        assert_eq!(work.simulated(), once);
+        let tried = best.fitted();
+        assert_eq!(tried.len(), 1);
+        assert!(tried[0].0 > 0.01, "without friction {}", tried[0].0);
+
+        // What is taken is the present model; what was tried in place of another one says nothing of it.
+        let mut best = Refined::new(&mut present, &measurements, &work);
+        let taken = best.takes(candidates(), |_| f64::INFINITY).unwrap();
+        assert_eq!(taken, Some("without"));
+        assert!(best.model.effects.is_empty());
+        assert!(best.fitted().is_empty());
+        assert_eq!(present.values(), tried[0].1.values());
+    }
+}
