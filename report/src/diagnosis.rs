@@ -50,9 +50,13 @@ pub fn diagnosis_page(
     ));
     body.push_str(&residual_force(diagnosis.residual_force.as_ref()));
     if candidates::were_tried(diagnosis) {
+        let note = match diagnosis.candidates[..] {
+            [] => TRIED,
+            _ => CANDIDATES,
+        };
         body.push_str(&section(
             "What could be missing",
-            CANDIDATES,
+            note,
             &(candidates::candidates(diagnosis) + &untried(diagnosis)),
         ));
     }
@@ -72,6 +76,10 @@ fn untried(diagnosis: &Diagnosis) -> String {
         format!("<p>{}</p>\n", escape(&sentence))
     })
 }
+
+/// What is to be seen where the list of explanations is empty.
+const TRIED: &str = "Every effect that the log can show was tried at every place where it fits: one step of a fit says what \
+    it promises.";
 
 /// What is to be seen in a list of explanations.
 pub(crate) const CANDIDATES: &str = "Every effect that the log can show was tried at every place where it fits: one step of \
