@@ -6,7 +6,7 @@ use super::states::StateTable;
 use super::table::{Ordered, ParameterTable};
 use super::tree::{Slot, Tree};
 use crate::model::signals;
-use loopsight_core::{Channel, PlantMeta, Role};
+use loopsight_core::{Channel, PlantMeta, Reading, Real, Role};
 
 pub(super) const PARAMETERS: u8 = FIRST_BANK;
 pub(super) const ROLES: u8 = FIRST_BANK + 1;
@@ -14,6 +14,16 @@ pub(super) const SIGNALS: u8 = FIRST_BANK + 2;
 pub(super) const HERE: u8 = FIRST_BANK + 3;
 /// What an effect sees beside signals, in this order; its states follow.
 pub(super) const HERE_NAMES: [&str; 3] = ["nominal", "side", "time"];
+
+/// The signals that an effect reads by their `roles`, in this order; `N` at most.
+#[inline(always)]
+pub(super) fn read_roles<S: Real, const N: usize>(at: &Reading<'_, S>, roles: &[Role]) -> [S; N] {
+    let mut read = [S::zero(); N];
+    for (to, role) in read.iter_mut().zip(roles) {
+        *to = at.get(*role);
+    }
+    read
+}
 
 /// Where in an effect an expression stands: not every name has a meaning everywhere.
 #[derive(Clone, Copy, PartialEq)]

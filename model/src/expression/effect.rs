@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::at_channels::{
-    AtChannels, HERE, HERE_NAMES, PARAMETERS, ROLES, SIGNALS, Site, slot, state_slot,
+    AtChannels, HERE, HERE_NAMES, PARAMETERS, ROLES, SIGNALS, Site, read_roles, slot, state_slot,
 };
 use super::described::EFFECT_PART;
 use super::keep::{self, Kept};
@@ -67,10 +67,17 @@ macro_rules! physics {
             ) -> $scalar {
                 let Some(motion) = &self.motion else {
                     let here = [at.nominal, at.side, <$scalar>::of(at.time)];
-                    let roles = Role::ALL.map(|r| at.get(r));
-                    return self.force.value(&[p, &roles, at.signals, &here]);
+                    let value = |roles: &[$scalar]| {
+                        self.force.value(&[p, roles, at.signals, &here])
+                    };
+                    // Most read one or two.
+                    return if self.meta.reads.len() <= 2 {
+                        value(&read_roles::<_, 2>(at, self.meta.reads))
+                    } else {
+                        value(&read_roles::<_, { Role::COUNT }>(at, self.meta.reads))
+                    };
                 };
-                let mut reads = Reads::new(at, z);
+                let mut reads = Reads::new(at, self.meta.reads, z);
                 motion.confine(reads.states(), p);
                 self.force.value(&reads.banks(p))
             }
@@ -82,7 +89,7 @@ macro_rules! physics {
                 dz: &mut [$scalar],
             ) {
                 if let Some(motion) = &self.motion {
-                    let mut reads = Reads::new(at, z);
+                    let mut reads = Reads::new(at, self.meta.reads, z);
                     motion.confine(reads.states(), p);
                     motion.rates(&reads, p, dz);
                 }
@@ -94,7 +101,7 @@ macro_rules! physics {
                 z: &mut [$scalar],
             ) {
                 if let Some(motion) = &self.motion {
-                    motion.starts(&Reads::new(at, &[]), p, z);
+                    motion.starts(&Reads::new(at, self.meta.reads, &[]), p, z);
                 }
             }
             fn confine(&self, z: &mut [$scalar], p: &[$scalar]) {
@@ -187,6 +194,16 @@ impl EffectTable {
                 }
             });
         }
+        // Only the roles that are read are looked up, so they are counted among themselves.
+        let compact = |tree: &Tree| {
+            tree.replace(&|s| {
+                let of = |role: &Role| s == slot(ROLES, *role as usize);
+                Some(Tree::Name(slot(ROLES, roles.iter().position(of)?)))
+            })
+        };
+        let force = Program::new([&compact(&tree)]);
+        let moved = moved.each(&compact);
+        let motion = (!self.states.is_empty()).then(|| Motion::new(&moved));
         let parameters = self.declare(plant, at, &tree)?;
         let meta = EffectMeta {
             id: keep::text(self.name.as_deref().unwrap_or(EFFECT_PART.id)),
@@ -214,8 +231,8 @@ impl EffectTable {
         };
         Ok(Law {
             meta,
-            force: Program::new([&tree]),
-            motion: (!self.states.is_empty()).then(|| Motion::new(&moved)),
+            force,
+            motion,
             signals: read,
         })
     }

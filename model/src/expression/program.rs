@@ -54,6 +54,14 @@ enum Code {
     AddSum,
     /// accumulator - (a + b)
     SubtractSum,
+    /// accumulator + saved\[a\]
+    AddSaved,
+    /// accumulator - saved\[a\]
+    SubtractSaved,
+    /// saved\[a\] - accumulator
+    SubtractFromSaved,
+    /// accumulator saved\[a\]
+    MultiplySaved,
     /// accumulator and saved\[a\]
     Saved(Binary),
     /// saved\[a\] and accumulator
@@ -236,12 +244,7 @@ impl Program {
                     self.push(Code::Save, kept);
                     self.saved = self.saved.max(saved + 1);
                     self.emit(second, saved + 1);
-                    let code = if deeper_first {
-                        Code::SavedFirst(*operation)
-                    } else {
-                        Code::Saved(*operation)
-                    };
-                    self.push(code, kept);
+                    self.push(with_saved(*operation, deeper_first), kept);
                 }
             }
         }
@@ -295,6 +298,11 @@ impl Program {
                     .unwrap_or(&zero)
                 };
             }
+            macro_rules! saved {
+                () => {
+                    *saved.get(usize::from(a.index)).unwrap_or(&zero)
+                };
+            }
             let index = usize::from(a.index);
             match code {
                 Code::Load => x = at!(a),
@@ -326,12 +334,12 @@ impl Program {
                 Code::Sum => x = at!(a) + at!(b),
                 Code::AddSum => x += at!(a) + at!(b),
                 Code::SubtractSum => x -= at!(a) + at!(b),
-                Code::Saved(operation) => {
-                    x = operation.apply(x, *saved.get(index).unwrap_or(&zero));
-                }
-                Code::SavedFirst(operation) => {
-                    x = operation.apply(*saved.get(index).unwrap_or(&zero), x);
-                }
+                Code::AddSaved => x += saved!(),
+                Code::SubtractSaved => x -= saved!(),
+                Code::SubtractFromSaved => x = saved!() - x,
+                Code::MultiplySaved => x *= saved!(),
+                Code::Saved(operation) => x = operation.apply(x, saved!()),
+                Code::SavedFirst(operation) => x = operation.apply(saved!(), x),
                 Code::Negate => x = -x,
                 Code::Square => x = x * x,
                 Code::Whole => x = whole_power(x, index),
@@ -367,6 +375,18 @@ fn reversed(operation: Binary) -> Code {
         Binary::Multiply => Code::Multiply,
         Binary::Divide => Code::DivideInto,
         other => Code::Reversed(other),
+    }
+}
+
+/// The operation on the accumulator and a saved result, which may come `first`.
+fn with_saved(operation: Binary, first: bool) -> Code {
+    match (operation, first) {
+        (Binary::Add, _) => Code::AddSaved,
+        (Binary::Multiply, _) => Code::MultiplySaved,
+        (Binary::Subtract, false) => Code::SubtractSaved,
+        (Binary::Subtract, true) => Code::SubtractFromSaved,
+        (other, false) => Code::Saved(other),
+        (other, true) => Code::SavedFirst(other),
     }
 }
 

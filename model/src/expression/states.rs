@@ -4,7 +4,7 @@ use serde::de::Visitor;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
-use super::at_channels::{AtChannels, HERE_NAMES, Site};
+use super::at_channels::{AtChannels, HERE_NAMES, Site, read_roles};
 use super::parse::parse;
 use super::placed;
 use super::program::{N_BANKS, Numbers, Program};
@@ -84,6 +84,16 @@ impl Read {
     /// All of them.
     pub(super) fn trees(&self) -> impl Iterator<Item = &Tree> {
         self.rates.iter().chain(&self.starts).chain(&self.limits)
+    }
+
+    /// Each of them as `with` makes it.
+    pub(super) fn each(&self, with: &dyn Fn(&Tree) -> Tree) -> Self {
+        let of = |trees: &[Tree]| trees.iter().map(with).collect();
+        Self {
+            rates: of(&self.rates),
+            starts: of(&self.starts),
+            limits: of(&self.limits),
+        }
     }
 }
 
@@ -249,13 +259,13 @@ pub(super) struct Reads<'a, S> {
 }
 
 impl<'a, S: Real> Reads<'a, S> {
-    pub(super) fn new(at: &Reading<'a, S>, z: &[S]) -> Self {
+    pub(super) fn new(at: &Reading<'a, S>, roles: &[Role], z: &[S]) -> Self {
         let mut here = [S::zero(); HERE_NAMES.len() + MOST];
         here[..HERE_NAMES.len()].copy_from_slice(&[at.nominal, at.side, S::of(at.time)]);
         let n = z.len().min(MOST);
         here[HERE_NAMES.len()..][..n].copy_from_slice(&z[..n]);
         Self {
-            roles: Role::ALL.map(|r| at.get(r)),
+            roles: read_roles(at, roles),
             signals: at.signals,
             here,
             n: HERE_NAMES.len() + n,
