@@ -154,7 +154,8 @@ impl Search<'_> {
 
     /// Whether nothing is missing, and a `promise` gives no reason to think otherwise.
     fn is_needless(&self, promise: Promise) -> bool {
-        self.worth_trying().is_some_and(|most| promise.left > most)
+        let explains_less = |left| self.worth_trying().is_some_and(|most| left > most);
+        promise.left.is_some_and(explains_less)
     }
 
     /// Where the plain model leaves hardly more than noise, what anything that is worth trying may leave of its cost: it
@@ -241,7 +242,7 @@ impl Search<'_> {
         let nothing = at_floor
             && all
                 .iter()
-                .all(|(p, _)| p.left == 0.0 || self.is_needless(*p));
+                .all(|(p, _)| p.left.is_none() || self.is_needless(*p));
         if nothing || looked.best().is_some_and(explained) {
             let idle = |promise: Promise| {
                 nothing || !self.tells(promise.cost) || self.is_beside(promise, looked)

@@ -17,6 +17,7 @@
 //! left = min ‖r₀ + J [δ w α]ᵀ‖² / min ‖r₀ + J₀ δ‖²        J = [J₀ W r - r₀]
 //! ```
 
+use std::rc::Rc;
 use std::sync::OnceLock;
 
 use loopsight_model::model::pseudo_inverse;
@@ -24,6 +25,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::candidates::Candidate;
 use crate::gram::gram;
+use crate::linearised::Linearised;
 use crate::positions::Positions;
 use crate::prediction::Solution;
 use crate::problem::Problem;
@@ -38,8 +40,8 @@ const PROMISE_STEPS: f64 = 4.0;
 pub(crate) struct Promise {
     /// The cost after one Gauss–Newton step; infinite where it promises nothing.
     pub(crate) cost: f64,
-    /// The share that it must leave of what the plain model leaves; 0 where that is not known.
-    pub(crate) left: f64,
+    /// The share that it must leave of what the plain model leaves; none where that is not known.
+    pub(crate) left: Option<f64>,
 }
 
 /// The promises of candidates.
@@ -63,6 +65,8 @@ struct Linear {
     jacobian: DMatrix<f64>,
     /// `J₀ᵀJ₀`
     gram: DMatrix<f64>,
+    /// `min ‖r₀ + J₀ δ‖²`
+    alone: Option<f64>,
 }
 
 impl<'a> Promises<'a> {
@@ -105,12 +109,13 @@ impl<'a> Promises<'a> {
         };
         let mut problem = nominal.problem(&model, known)?;
         problem.positions = at;
-        let (before, after, left) = match linear {
-            Some(linear) => linear.promise(&mut problem, start, self.finely)?,
-            None => {
-                let (before, after) = problem.promise(start, states).ok()??;
-                (before, after, 0.0)
+        let ((before, after), left) = match linear {
+            Some(linear) => {
+                let there = linear.at(&mut problem, start)?;
+                let left = self.finely.then(|| linear.left(&there)).flatten();
+                (linear.promise(&there)?, left)
             }
+            None => (problem.promise(start, states).ok()??, None),
         };
         let criteria = nominal.criteria();
         let cost = match shape {
@@ -163,42 +168,49 @@ impl<'a> Promises<'a> {
         let mut problem = nominal.problem(&model, nominal.held)?;
         problem.positions = at.cloned();
         let there = problem.pack(values, states);
-        let linear = problem.linearise_once(&there).ok()?;
-        let gram = gram(&linear.jacobian);
-        gram.iter().all(|v| v.is_finite()).then(|| Linear {
-            positions: at.cloned(),
-            first: problem.first.clone(),
-            residual: linear.residual,
-            jacobian: linear.jacobian,
-            gram,
-        })
+        let there = problem.linearise_once(&there).ok()?;
+        Linear::new(at.cloned(), problem.first, there)
     }
 }
 
 impl Linear {
-    /// Cost at the start of a candidate, whose own parameters are the unknowns of `problem`, the one that a full
-    /// Gauss–Newton step of all parameters would reach if the model were linear in them, and the share that it must leave:
-    /// 0 where nobody asks `finely`.
-    fn promise(
-        &self,
-        problem: &mut Problem<'_>,
-        start: &[f64],
-        finely: bool,
-    ) -> Option<(f64, f64, f64)> {
+    /// None where a derivative is not finite.
+    fn new(positions: Option<Positions>, first: Vec<Vec<f64>>, there: Linearised) -> Option<Self> {
+        let gram = gram(&there.jacobian);
+        let mut linear = Self {
+            positions,
+            first,
+            residual: there.residual,
+            jacobian: there.jacobian,
+            gram,
+            alone: None,
+        };
+        let none = DMatrix::zeros(linear.residual.len(), 0);
+        linear.alone = linear.after(&linear.residual, &none);
+        linear.gram.iter().all(|v| v.is_finite()).then_some(linear)
+    }
+
+    /// The residuals of a candidate at its start and their derivatives by its own parameters, which are the unknowns of
+    /// `problem`.
+    fn at(&self, problem: &mut Problem<'_>, start: &[f64]) -> Option<Rc<Linearised>> {
         problem.first.clone_from(&self.first);
         // What is known is no unknown.
-        let linear = problem.linearise(&problem.pack(start, &[])).ok()?;
-        let (residual, own) = (&linear.residual, &linear.jacobian);
-        let after = self.after(residual, own)?;
-        let left = || {
-            let many = own.ncols();
-            let mut all = own.clone().resize_horizontally(many + 1, 0.0);
-            all.set_column(many, &(residual - &self.residual));
-            let none = DMatrix::zeros(all.nrows(), 0);
-            Some(self.after(&self.residual, &all)? / self.after(&self.residual, &none)?)
-        };
-        let left = if finely { left().unwrap_or(0.0) } else { 0.0 };
-        Some((residual.norm_squared(), after, left))
+        problem.linearise(&problem.pack(start, &[])).ok()
+    }
+
+    /// Cost at the start of a candidate, and the one that a full Gauss–Newton step of all parameters would reach if the model
+    /// were linear in them.
+    fn promise(&self, there: &Linearised) -> Option<(f64, f64)> {
+        let after = self.after(&there.residual, &there.jacobian)?;
+        Some((there.residual.norm_squared(), after))
+    }
+
+    /// The share that a candidate must leave of what the plain model's own step leaves.
+    fn left(&self, there: &Linearised) -> Option<f64> {
+        let own = there.jacobian.ncols();
+        let mut all = there.jacobian.clone().resize_horizontally(own + 1, 0.0);
+        all.set_column(own, &(&there.residual - &self.residual));
+        Some(self.after(&self.residual, &all)? / self.alone?)
     }
 
     /// What is left of the square of `residual` by the best sum of the plain model's derivatives and its `own`.
@@ -256,19 +268,14 @@ mod tests {
         let of_plain = problem(&plain);
         let at = of_plain.pack(&plain.values(), &states);
         let there = of_plain.linearise_once(&at).unwrap();
-        let linear = Linear {
-            positions: None,
-            first: Vec::new(),
-            gram: there.jacobian.tr_mul(&there.jacobian),
-            residual: there.residual,
-            jacobian: there.jacobian,
-        };
+        let linear = Linear::new(None, Vec::new(), there).unwrap();
         let mut own = with.clone();
         for parameter in &mut own.parameters[..plain.parameters.len()] {
             parameter.free = false;
         }
         let start = with.values();
-        let shared = linear.promise(&mut problem(&own), &start, true).unwrap();
+        let there = linear.at(&mut problem(&own), &start).unwrap();
+        let shared = linear.promise(&there).unwrap();
         let whole = problem(&with).promise(&start, &states).unwrap().unwrap();
         assert!(
             (shared.0 / whole.0 - 1.0).abs() < 1e-9,
@@ -280,16 +287,17 @@ mod tests {
         );
         assert!(shared.1 < 0.1 * shared.0, "{shared:?}");
         // A start without influence adds nothing to what the derivatives can do.
-        let none = DMatrix::zeros(linear.residual.len(), 0);
-        let of_plain = linear.after(&linear.residual, &none).unwrap();
+        let left = linear.left(&there).unwrap();
+        let of_plain = linear.alone.unwrap();
         assert!(
-            (shared.2 * of_plain / shared.1 - 1.0).abs() < 1e-6,
-            "{shared:?} {of_plain}"
+            (left * of_plain / shared.1 - 1.0).abs() < 1e-6,
+            "{left} {shared:?} {of_plain}"
         );
 
         // Four times as strong as the friction is, it could still explain a third of what is left.
         let strong = [&plain.values()[..], &[3.2, 0.5]].concat();
-        let strong = linear.promise(&mut problem(&own), &strong, true).unwrap();
-        assert!(strong.2 < 0.67, "{strong:?}");
+        let strong = linear.at(&mut problem(&own), &strong).unwrap();
+        let left = linear.left(&strong).unwrap();
+        assert!(left < 0.67, "{left}");
     }
 }

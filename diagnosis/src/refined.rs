@@ -1,6 +1,6 @@
 //! A model, and corrections to it that are tried.
 
-use loopsight_model::model::{Attached, Model};
+use loopsight_model::model::Model;
 use rayon::prelude::*;
 
 use crate::compare::free_run_error;
@@ -134,12 +134,9 @@ impl<'a> Refined<'a> {
 
 /// Whether two models that came of the same one are the same: their effects and parameters are.
 fn is_same(a: &Model, b: &Model) -> bool {
-    let alike = |(a, b): (&Attached, &Attached)| {
-        let at = |effect: &Attached| effect.at.iter().map(|c| c.id).collect::<Vec<_>>();
-        a.meta.id == b.meta.id && at(a) == at(b)
-    };
+    let mut effects = a.effects.iter().zip(&b.effects);
     a.effects.len() == b.effects.len()
-        && a.effects.iter().zip(&b.effects).all(alike)
+        && effects.all(|(a, b)| a.is_same(b))
         && a.parameters == b.parameters
 }
 

@@ -5,7 +5,7 @@ use loopsight_diagnosis::{
     improve,
 };
 use loopsight_model::config::{PathSegment, TomlSource};
-use loopsight_model::model::{Attached, Model as Composed, ModelParameter, Origin};
+use loopsight_model::model::{Model as Composed, ModelParameter, Origin};
 
 use crate::answers::{ImproveAnswer, Reported};
 use crate::error::Result;
@@ -98,9 +98,6 @@ fn improved_text(
     best: &Composed,
     steps: &[ImprovementStep],
 ) -> String {
-    let is = |a: &Attached, b: &Attached| {
-        a.meta.id == b.meta.id && a.at.iter().map(|c| c.id).eq(b.at.iter().map(|c| c.id))
-    };
     let mut text = source.text.clone();
     let mut edit = |change: &dyn Fn(&TomlSource) -> String| {
         if let Ok(present) = TomlSource::parse(&source.file, &text) {
@@ -108,13 +105,13 @@ fn improved_text(
         }
     };
     for (index, effect) in before.effects.iter().enumerate().rev() {
-        if !best.effects.iter().any(|e| is(e, effect)) {
+        if !best.effects.iter().any(|e| e.is_same(effect)) {
             edit(&|present| present.without_effect(index));
         }
     }
     let mut written: Vec<&str> = Vec::new();
     for effect in &best.effects {
-        if before.effects.iter().any(|e| is(e, effect)) {
+        if before.effects.iter().any(|e| e.is_same(effect)) {
             continue;
         }
         let id = effect.meta.id;
@@ -156,7 +153,7 @@ fn improved_text(
     let plant = model.parameters.iter().take(n(&model));
     pairs.extend(plant.zip(best.parameters.iter().take(n(best))));
     for effect in &model.effects {
-        if let Some(found) = best.effects.iter().find(|e| is(e, effect)) {
+        if let Some(found) = best.effects.iter().find(|e| e.is_same(effect)) {
             let to = model.parameters.iter().skip(effect.first_parameter);
             let from = best.parameters.iter().skip(found.first_parameter);
             pairs.extend(to.zip(from).take(effect.meta.parameters.len()));

@@ -51,12 +51,12 @@ pub fn diagnosis_page(
     body.push_str(&residual_force(diagnosis.residual_force.as_ref()));
     if candidates::were_tried(diagnosis) {
         let note = match diagnosis.candidates[..] {
-            [] => TRIED,
-            _ => CANDIDATES,
+            [] => TRIED.to_owned(),
+            _ => about_candidates(),
         };
         body.push_str(&section(
             "What could be missing",
-            note,
+            &note,
             &(candidates::candidates(diagnosis) + &untried(diagnosis)),
         ));
     }
@@ -77,15 +77,19 @@ fn untried(diagnosis: &Diagnosis) -> String {
     })
 }
 
-/// What is to be seen where the list of explanations is empty.
+/// How the explanations are found.
 const TRIED: &str = "Every effect that the log can show was tried at every place where it fits: one step of a fit says what \
     it promises.";
 
-/// What is to be seen in a list of explanations.
-pub(crate) const CANDIDATES: &str = "Every effect that the log can show was tried at every place where it fits: one step of \
-    a fit says what it promises. Where it promised most, all parameters were fitted again, and the free run was judged on \
+/// How the list of them is made.
+const FITTED: &str = "Where it promised most, all parameters were fitted again, and the free run was judged on \
     data that the fit did not see. The first candidate is the simplest that is not clearly worse than the best. The others \
     follow by their error. Tap a candidate to see what it is and what helps against it.";
+
+/// What is to be seen in a list of explanations.
+pub(crate) fn about_candidates() -> String {
+    format!("{TRIED} {FITTED}")
+}
 
 /// Measured and models over time.
 pub(crate) fn against_measurements(

@@ -7,7 +7,7 @@ use crate::beside::Names;
 use crate::candidates;
 use crate::comparison::faults;
 use crate::conclusion::conclusion;
-use crate::diagnosis::{CANDIDATES, TERMS, advice, against_measurements, failures, shares};
+use crate::diagnosis::{TERMS, about_candidates, advice, against_measurements, failures, shares};
 use crate::fit::estimates;
 use crate::html::{escape, identifier, list, text};
 use crate::next;
@@ -151,5 +151,5 @@ fn rounds(diagnoses: &[Diagnosis]) -> String {
     if body.is_empty() {
         return body;
     }
-    section("What could be missing", CANDIDATES, &body)
+    section("What could be missing", &about_candidates(), &body)
 }

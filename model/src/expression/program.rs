@@ -298,12 +298,12 @@ impl Program {
                     .unwrap_or(&zero)
                 };
             }
+            let index = usize::from(a.index);
             macro_rules! saved {
                 () => {
-                    *saved.get(usize::from(a.index)).unwrap_or(&zero)
+                    *saved.get(index).unwrap_or(&zero)
                 };
             }
-            let index = usize::from(a.index);
             match code {
                 Code::Load => x = at!(a),
                 Code::Copy => {

@@ -21,6 +21,14 @@ pub struct Attached {
     pub(crate) signals: Vec<usize>,
 }
 
+impl Attached {
+    /// Whether it is the same effect at the same channels as `other`.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let others = other.at.iter().map(|c| c.id);
+        self.meta.id == other.meta.id && self.at.iter().map(|c| c.id).eq(others)
+    }
+}
+
 /// A measured signal of a composed model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredSignal {
