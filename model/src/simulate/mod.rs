@@ -4,6 +4,7 @@ pub(crate) mod bound;
 mod follow;
 mod foresee;
 pub(crate) mod history;
+mod length;
 mod lengthen;
 mod observer;
 mod plan;
@@ -23,11 +24,12 @@ use std::collections::BTreeSet;
 use crate::log_map::Hold;
 use crate::model::Model;
 use crate::registry::HostReal;
-use loopsight_core::{NoPast, Place, Rk4, substeps};
+use loopsight_core::{NoPast, Place, Rk4};
 
 use bound::{Bounds, Scene};
 pub use follow::{follow, free_run, try_follow};
 use history::{Between, History};
+use length::Length;
 use lengthen::Lengthened;
 use plan::Plan;
 use push::Pushed;
@@ -72,8 +74,8 @@ pub struct Simulator<'m, S> {
     trail: bool,
     time: f64,
     interval: f64,
-    /// Longest integration step, s.
-    longest: f64,
+    /// How long the integration steps are.
+    length: Length,
     /// Steps longer than that where the samples are far apart and the motion allows them; none where the
     /// file gives the step.
     lengthened: Option<Lengthened<S>>,
@@ -197,7 +199,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             bounds,
             time: 0.0,
             interval: 0.0,
-            longest: model.step(),
+            length: Length::of(&model),
             lengthened,
             slopes: vec![0.0; nu],
             ramped: (0..nu)
@@ -351,7 +353,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             }
         }
         let span = until - self.time;
-        let steps = substeps(span, self.longest);
+        let steps = self.length.steps(span);
         if self.lengthens(steps) {
             self.advance_lengthened(input, span, steps);
         } else {

@@ -28,7 +28,7 @@ impl<S: HostReal> Simulator<'_, S> {
             return;
         }
         let at_rest = vec![0.0; self.slopes.len()];
-        let sticking = self.longest * self.fastest(&at_rest, 0.0);
+        let sticking = self.length.longest * self.fastest(&at_rest, 0.0);
         self.way = Way::Explicit;
         if sticking <= STABLE {
             return;
@@ -37,12 +37,12 @@ impl<S: HostReal> Simulator<'_, S> {
         for i in widths {
             self.values[i] = self.values[i].times(S::of(WIDE));
         }
-        let moving = self.longest * self.fastest(&at_rest, 0.0);
+        let moving = self.length.longest * self.fastest(&at_rest, 0.0);
         self.values = kept;
         self.way = Way::Explicit;
         // What is too fast for the step without friction is no matter of friction.
         if moving <= STABLE {
-            self.longest *= (STABLE / sticking).max(SHORTEST);
+            self.length.shorten((STABLE / sticking).max(SHORTEST));
         }
     }
 }
