@@ -328,8 +328,9 @@ impl Model {
         f64::dynamics(self.dynamics).max_step_s()
     }
 
-    /// Longest integration step that is taken, s: [`Model::max_step`], or what an effect asks for with
-    /// [`EffectMeta::max_step_s`](loopsight_core::EffectMeta::max_step_s).
+    /// Longest usual integration step, s: [`Model::max_step`], or what an effect asks for with
+    /// [`EffectMeta::max_step_s`](loopsight_core::EffectMeta::max_step_s). Where neither the file nor an effect says how long
+    /// a step may be, one may be a quarter longer, so that a late sample takes no step more.
     pub fn step(&self) -> f64 {
         let effects = self.effects.iter().map(|e| e.meta.max_step_s);
         effects.fold(self.max_step, f64::min)

@@ -74,6 +74,18 @@ fn a_static_map_is_evaluated_once_with_the_same_digits() {
     assert_eq!(names.join(" "), all);
 }
 
+/// An axis with a rate of 960 1/s is stable with steps of 2.5 ms, and not with one of 3.1 ms: samples so far apart take two.
+#[test]
+fn no_step_is_stretched_until_it_is_unstable() {
+    let model = model("[plant.dc_axis]\nK_A = -960.0\nK_C = 960.0\n");
+    let mut simulator = Simulator::new(&model, &model.values());
+    for k in 1..=400 {
+        simulator.advance(0.0031 * f64::from(k), &[1.0]);
+    }
+    let speed = simulator.state()[0];
+    assert!((speed - 1.0).abs() < 1e-9, "{speed}");
+}
+
 /// A speed at rest under friction, and its derivative by the speed at the start, die out, and do not go on to numbers with
 /// which a processor computes slowly.
 #[test]

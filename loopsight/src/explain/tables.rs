@@ -159,7 +159,7 @@ pub(super) static TABLES: [PartMeta; 3] = [
         settings: &[key(
             "max_step_s",
             "s",
-            "longest step; by default the plant's own, or a longer one where samples are far apart and steps of half the length come to the same place",
+            "longest step; by default the plant's own, up to a quarter longer so that a late sample takes no step more, or a longer one where samples are far apart and steps of half the length come to the same place",
         )],
     },
 ];

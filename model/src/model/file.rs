@@ -36,8 +36,8 @@ pub struct ModelFile {
 #[serde(deny_unknown_fields)]
 pub struct SimulationTable {
     /// Longest integration step, s; by default the plant's own
-    /// ([`Plant::MAX_STEP_S`](loopsight_core::Plant::MAX_STEP_S)), or longer where samples are far apart and
-    /// steps of half the length come to the same place.
+    /// ([`Plant::MAX_STEP_S`](loopsight_core::Plant::MAX_STEP_S)), up to a quarter longer so that a late sample takes no
+    /// step more, or longer where samples are far apart and steps of half the length come to the same place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_step_s: Option<f64>,
 }

@@ -13,7 +13,7 @@ const STRETCH: f64 = 1.25;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Length {
     /// Where the choice is free.
-    usual: f64,
+    pub(super) usual: f64,
     /// No step is longer.
     pub(super) longest: f64,
 }
@@ -30,10 +30,15 @@ impl Length {
         }
     }
 
-    /// Shorter ones, all by the same factor.
-    pub(super) fn shorten(&mut self, by: f64) {
-        self.usual *= by;
-        self.longest *= by;
+    /// Whether a step may be longer than usual.
+    pub(super) fn stretches(&self) -> bool {
+        self.longest > self.usual
+    }
+
+    /// Makes none longer than `most`.
+    pub(super) fn limit(&mut self, most: f64) {
+        self.longest = most;
+        self.usual = self.usual.min(most);
     }
 
     /// Number of equal steps that make up `span`: the nearest whole number of usual ones, of which none is longer than the
@@ -42,7 +47,7 @@ impl Length {
     /// Time stamps of a logger scatter: with 4.99 to 5.01 ms between samples, steps of at most 2.5 ms would be two for one
     /// sample and three for the next.
     pub(super) fn steps(&self, span: f64) -> usize {
-        if self.longest > self.usual {
+        if self.stretches() {
             let least = substeps(span, self.longest);
             substeps(span - 0.5 * self.usual, self.usual).max(least)
         } else {
@@ -93,6 +98,11 @@ mod tests {
                 assert_eq!(strict.steps(span), substeps(span, 2.5e-3));
             }
         }
+        let mut limited = USUAL;
+        limited.limit(2.8e-3);
+        assert!((limited.usual, limited.steps(3.1e-3), limited.steps(2.7e-3)) == (2.5e-3, 2, 1));
+        limited.limit(1e-3);
+        assert_eq!((limited.usual, limited.steps(1.1e-3)), (1e-3, 2));
         assert_eq!(USUAL.steps(f64::NAN), 1);
         assert_eq!(USUAL.steps(-1.0), 1);
     }

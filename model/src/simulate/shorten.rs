@@ -10,7 +10,8 @@ const SHORTEST: f64 = 1.0 / 64.0;
 const WIDE: f64 = 1e9;
 
 impl<S: HostReal> Simulator<'_, S> {
-    /// Makes the longest step so short that it is stable where dry friction holds the machine at rest.
+    /// Makes the longest step so short that it is stable where dry friction holds the machine at rest, and lets none be longer
+    /// than usual that would not be stable.
     ///
     /// There friction of `F` that is smoothed over `w` is a damper of `F/w`: it is the fastest that the machine knows,
     /// and a step that is too long for it makes the speed jump about zero within the width. The values hardly show it,
@@ -24,25 +25,31 @@ impl<S: HostReal> Simulator<'_, S> {
         let widths: Vec<usize> = (0..self.model.parameters.len())
             .filter(|i| self.model.parameters[*i].declaration.is_width())
             .collect();
-        if widths.is_empty() {
+        if widths.is_empty() && !self.length.stretches() {
             return;
         }
-        let at_rest = vec![0.0; self.slopes.len()];
-        let sticking = self.length.longest * self.fastest(&at_rest, 0.0);
-        self.way = Way::Explicit;
-        if sticking <= STABLE {
+        let sticking = self.fastest_at_rest();
+        if self.length.longest * sticking <= STABLE {
             return;
         }
         let kept = self.values.clone();
         for i in widths {
             self.values[i] = self.values[i].times(S::of(WIDE));
         }
-        let moving = self.length.longest * self.fastest(&at_rest, 0.0);
+        let moving = self.fastest_at_rest();
         self.values = kept;
+        // What is too fast for the usual step without friction is no matter of friction.
+        let usual = self.length.usual;
+        let friction = usual * moving <= STABLE;
+        let shortest = if friction { SHORTEST * usual } else { usual };
+        self.length.limit((STABLE / sticking).max(shortest));
+    }
+
+    /// The fastest rate at rest, 1/s.
+    fn fastest_at_rest(&mut self) -> f64 {
+        let at_rest = vec![0.0; self.slopes.len()];
+        let rate = self.fastest(&at_rest, 0.0);
         self.way = Way::Explicit;
-        // What is too fast for the step without friction is no matter of friction.
-        if moving <= STABLE {
-            self.length.shorten((STABLE / sticking).max(SHORTEST));
-        }
+        rate
     }
 }
