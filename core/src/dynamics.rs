@@ -1,6 +1,6 @@
 //! Plants behind one interface for any of them, and how a plant gets there.
 
-use crate::integrator::rk4_stages;
+use crate::integrator::{bend, rk4_stages};
 use crate::plant::MAX_STEP_S;
 use crate::{Array, Derived, Plant, Real, Unshown};
 
@@ -11,6 +11,8 @@ pub struct Steps<S> {
     pub count: usize,
     /// Length of one, s.
     pub length: S,
+    /// Whether it is asked how far the rates bend.
+    pub watched: bool,
 }
 
 /// What a plant moves under while effects act on its efforts.
@@ -45,18 +47,20 @@ pub trait Dynamics<S: Real>: Send + Sync {
     fn derivative(&self, x: &[S], u: &[S], w: &[S], p: &[S], dx: &mut [S]);
     /// Steps of the plant alone with constant inputs and efforts. The result is exactly that of
     /// [`Rk4`](crate::Rk4) with [`Dynamics::derivative`], but without a call per stage.
-    fn steps(&self, x: &mut [S], span: Steps<S>, u: &[S], w: &[S], p: &[S]);
-    /// The same with efforts that change within a step: `act` adds to those of `w`. Nothing is done, and the answer is
-    /// false, where the plant does not offer this.
+    ///
+    /// Returns how far the rates bend over a step at most, where that is [watched](Steps::watched); 1 where it is not known.
+    fn steps(&self, x: &mut [S], span: Steps<S>, u: &[S], w: &[S], p: &[S]) -> f64;
+    /// The same with efforts that change within a step: `act` adds to those of `w`. Nothing is done, and there is no
+    /// answer, where the plant does not offer this.
     fn steps_under(
         &self,
         x: &mut [S],
         under: &Under<'_, S>,
         signals: &mut [S],
         act: &mut Act<'_, S>,
-    ) -> bool {
+    ) -> Option<f64> {
         let _ = (x, under, signals, act);
-        false
+        None
     }
     /// See [`Plant::TRAIL`].
     fn trail(&self) -> &'static [usize] {
@@ -67,8 +71,8 @@ pub trait Dynamics<S: Real>: Send + Sync {
         self.derivative(x, u, w, p, dx);
     }
     /// As [`Dynamics::steps`], of the [motion](Dynamics::motion).
-    fn steps_of_motion(&self, x: &mut [S], span: Steps<S>, u: &[S], w: &[S], p: &[S]) {
-        self.steps(x, span, u, w, p);
+    fn steps_of_motion(&self, x: &mut [S], span: Steps<S>, u: &[S], w: &[S], p: &[S]) -> f64 {
+        self.steps(x, span, u, w, p)
     }
     /// `h_index(x, u; p)`; zero for slices of other lengths.
     fn output(&self, index: usize, x: &[S], u: &[S], p: &[S]) -> S;
@@ -102,6 +106,23 @@ pub trait Dynamics<S: Real>: Send + Sync {
     }
 }
 
+/// [`Dynamics::steps`] of a plant whose states change at this `rate`.
+#[doc(hidden)]
+#[inline(always)]
+pub fn steps_alone<S: Real, A: Array<S>>(x: &mut A, span: Steps<S>, rate: impl Fn(&A) -> A) -> f64 {
+    let mut most = 0f64;
+    if span.watched {
+        for _ in 0..span.count {
+            most = most.max(bend(&rk4_stages(x, span.length, |_, x| rate(x))));
+        }
+    } else {
+        for _ in 0..span.count {
+            rk4_stages(x, span.length, |_, x| rate(x));
+        }
+    }
+    most
+}
+
 /// [`Dynamics::steps_under`] of the plant `P` whose states change at this `rate`.
 #[doc(hidden)]
 #[inline(always)]
@@ -111,7 +132,7 @@ pub fn steps_under<P, S>(
     signals: &mut [S],
     act: &mut Act<'_, S>,
     rate: impl Fn(&P::State<S>, &P::Input<S>, &P::Effort<S>, &P::Parameters<S>) -> P::State<S>,
-) -> bool
+) -> Option<f64>
 where
     P: Plant,
     S: Real,
@@ -124,13 +145,14 @@ where
         P::Parameters::<S>::from_slice(under.p),
         signals.get(nx + nu..),
     ) else {
-        return false;
+        return None;
     };
+    let mut most = 0f64;
     for (to, from) in signals[nx..].iter_mut().zip(u.as_ref()) {
         *to = *from;
     }
     for step in 0..under.span.count {
-        rk4_stages(x, under.span.length, |stage, x| {
+        let rates = rk4_stages(x, under.span.length, |stage, x| {
             for i in under.states {
                 if let (Some(to), Some(from)) = (signals.get_mut(*i), x.as_ref().get(*i)) {
                     *to = *from;
@@ -141,8 +163,11 @@ where
             act((step, stage), signals, w.as_mut());
             rate(x, u, &w, p)
         });
+        if under.span.watched {
+            most = most.max(bend(&rates));
+        }
     }
-    true
+    Some(most)
 }
 
 /// Makes a [`Plant`] available behind [`Dynamics`].
@@ -188,20 +213,25 @@ macro_rules! declare_plant {
                     *to = from;
                 }
             }
-            fn steps(&self, x: &mut [S], span: $crate::Steps<S>, u: &[S], w: &[S], p: &[S]) {
+            fn steps(
+                &self,
+                x: &mut [S],
+                span: $crate::Steps<S>,
+                u: &[S],
+                w: &[S],
+                p: &[S],
+            ) -> f64 {
                 let (Some(x), Ok(u), Ok(w), Ok(p)) = (
                     <<$plant as $crate::PlantArrays>::State<S> as $crate::Array<S>>::from_mut_slice(x),
                     u.try_into(),
                     w.try_into(),
                     p.try_into(),
                 ) else {
-                    return;
+                    return 1.0;
                 };
-                for _ in 0..span.count {
-                    $crate::rk4_step(x, span.length, |x| {
-                        <$plant as $crate::Plant>::derivative::<S>(x, u, w, p)
-                    });
-                }
+                $crate::steps_alone(x, span, |x| {
+                    <$plant as $crate::Plant>::derivative::<S>(x, u, w, p)
+                })
             }
             fn steps_under(
                 &self,
@@ -209,7 +239,7 @@ macro_rules! declare_plant {
                 under: &$crate::Under<'_, S>,
                 signals: &mut [S],
                 act: &mut $crate::Act<'_, S>,
-            ) -> bool {
+            ) -> Option<f64> {
                 if <$plant as $crate::Plant>::TRAIL.is_empty() || under.trail {
                     $crate::steps_under::<$plant, S>(
                         x,
@@ -252,7 +282,7 @@ macro_rules! declare_plant {
                 u: &[S],
                 w: &[S],
                 p: &[S],
-            ) {
+            ) -> f64 {
                 if <$plant as $crate::Plant>::TRAIL.is_empty() {
                     return $crate::Dynamics::steps(self, x, span, u, w, p);
                 }
@@ -262,13 +292,11 @@ macro_rules! declare_plant {
                     w.try_into(),
                     p.try_into(),
                 ) else {
-                    return;
+                    return 1.0;
                 };
-                for _ in 0..span.count {
-                    $crate::rk4_step(x, span.length, |x| {
-                        <$plant as $crate::Plant>::motion::<S>(x, u, w, p)
-                    });
-                }
+                $crate::steps_alone(x, span, |x| {
+                    <$plant as $crate::Plant>::motion::<S>(x, u, w, p)
+                })
             }
             fn output(&self, index: usize, x: &[S], u: &[S], p: &[S]) -> S {
                 let (Ok(x), Ok(u), Ok(p)) = (x.try_into(), u.try_into(), p.try_into()) else {
@@ -388,6 +416,7 @@ mod tests {
                 span: Steps {
                     count: 40,
                     length: h,
+                    watched: false,
                 },
                 u: &u,
                 w: &w,
@@ -399,7 +428,8 @@ mod tests {
             let mut act = |(step, stage): (usize, usize), signals: &[f64], w: &mut [f64]| {
                 w[0] += drag(time(step, stage), signals);
             };
-            assert!(Swing.steps_under(&mut x, &under, &mut signals, &mut act));
+            let moved = Swing.steps_under(&mut x, &under, &mut signals, &mut act);
+            assert_eq!(moved, Some(0.0));
             let mut rk4 = Rk4::new([0.0; 3]);
             for step in 0..40 {
                 rk4.step(&mut y, h, |stage, x, dx| {
@@ -416,7 +446,8 @@ mod tests {
             assert_eq!(x, y);
             assert_eq!(x[2] == 0.0, !trail);
             // Lengths that are not the plant's move nothing.
-            assert!(!Swing.steps_under(&mut y[..2], &under, &mut signals, &mut act));
+            let moved = Swing.steps_under(&mut y[..2], &under, &mut signals, &mut act);
+            assert!(moved.is_none());
         }
     }
 }

@@ -95,12 +95,12 @@ pub use clock::{Clock, SimulatedClock};
 pub use controller::{AffineModel, Command, ControlError, Controller, Quantity};
 pub use derived::Derived;
 pub use driver::{Driver, DriverError, DriverFault, Sample};
-#[doc(hidden)]
-pub use dynamics::steps_under;
 pub use dynamics::{Act, Dynamics, Steps, Under};
+#[doc(hidden)]
+pub use dynamics::{steps_alone, steps_under};
 pub use effect::{Effect, EffectArrays, EffectMeta, NoPast, Past, Reading, Shows};
 pub use estimator::{Estimator, Innovation};
-pub use integrator::{Rk4, rk4_step, substeps};
+pub use integrator::{Bend, Rk4, rk4_step, substeps};
 pub use limits::Limits;
 pub use parameter::{End, Parameter};
 pub use physics::{Now, Physics, Spot};

@@ -154,9 +154,11 @@ pub(crate) fn refitted(
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<(f64, Model), FitError> {
-    let fitted = fitted_values(model, measurements.runs, CORRECTION, work)?;
+    let begun = model.clone().with_steps_by_motion();
+    let mut fitted = fitted_values(&begun, measurements.runs, CORRECTION, work)?;
     let judging = Measurements::new(measurements.judging());
     let error = free_run_error(&fitted, &judging, work)?;
+    fitted.by_motion = false;
     Ok((error, fitted))
 }
 

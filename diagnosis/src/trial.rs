@@ -76,7 +76,8 @@ pub(crate) fn coarse(candidate: &Candidate, steps: f64) -> Model {
     let mut model = match candidate.shape() {
         Some(_) => candidate.softened(),
         None => candidate.model.clone(),
-    };
+    }
+    .with_steps_by_motion();
     let usual = model.usual_step();
     if model.max_step >= usual {
         model.max_step = model.max_step.max(steps * usual);
@@ -226,8 +227,8 @@ fn softer(mut first: Judged, nominal: &Nominal<'_>) -> Option<(Judged, Fit)> {
 /// The full fit, without limits that nothing came to. None where its derivatives exceed `wild`, where the cost that it
 /// promises exceeds `most`, or where the effect only sharpens a sign.
 fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64, most: f64) -> Option<(Judged, Fit)> {
-    let model = &first.candidate.model;
-    let mut problem = nominal.problem(model, None)?;
+    let model = first.candidate.model.clone().with_steps_by_motion();
+    let mut problem = nominal.problem(&model, None)?;
     let start = problem.pack(&first.solution.values, &nominal.solution.states);
     if problem.steepness(&start).ok()? > wild {
         return None;
@@ -251,7 +252,8 @@ fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64, most: f64) -> Option<(
     if first.candidate.drowns(values, criteria) || first.candidate.has_no_way(values, criteria) {
         return None;
     }
-    let fit = problem.result(&found).ok()?;
+    let mut fit = problem.result(&found).ok()?;
+    fit.model.by_motion = false;
     if let Some(without) = first.candidate.without_unmet(&fit) {
         let again = Judged {
             candidate: without,
@@ -260,6 +262,6 @@ fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64, most: f64) -> Option<(
         };
         return fully(again, nominal, wild, f64::INFINITY);
     }
-    let judged = Judged::of(first.candidate.clone(), model, solution, nominal)?;
+    let judged = Judged::of(first.candidate.clone(), &model, solution, nominal)?;
     Some((judged, fit))
 }

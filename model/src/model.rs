@@ -53,6 +53,9 @@ pub struct Model {
     pub max_step: f64,
     /// The file gives it: then no step is longer, however far apart the samples are.
     pub step_given: bool,
+    /// Steps may be longer than [`Model::max_step`], up to the time between samples, where the motion allows it: for a
+    /// search, which ends with the usual ones. Nothing where the file gives the step.
+    pub by_motion: bool,
     pub(crate) dynamics: &'static dyn AnyDynamics,
     pub(crate) set: usize,
     pub(crate) n_plant_parameters: usize,
@@ -174,6 +177,7 @@ impl Model {
             log: file.log.clone(),
             max_step: step,
             step_given: file.simulation.max_step_s.is_some(),
+            by_motion: false,
             dynamics: ready.dynamics,
             set: values.set,
             n_plant_parameters,
@@ -321,6 +325,15 @@ impl Model {
             .iter()
             .filter(|c| matches!(c.place, Place::Effort(_)))
             .count()
+    }
+
+    /// The same, to be simulated with steps [as long as the motion allows](Model::by_motion).
+    #[must_use]
+    pub fn with_steps_by_motion(self) -> Self {
+        Self {
+            by_motion: true,
+            ..self
+        }
     }
 
     /// Longest integration step of the plant where no file gives one, s.

@@ -4,7 +4,7 @@
 
 use loopsight_core::Real;
 use loopsight_model::model::Model;
-use loopsight_model::registry;
+use loopsight_model::registry::{self, HostReal};
 use loopsight_model::run::{Rows, Run};
 use loopsight_model::simulate::{Simulator, free_run};
 use loopsight_model::{Dual, derivative, variable};
@@ -19,7 +19,7 @@ fn model(text: &str) -> Model {
 }
 
 /// What is measured while both inputs take turns at several levels.
-fn simulate(model: &Model, values: &[f64]) -> Vec<Vec<f64>> {
+fn simulate<S: HostReal>(model: &Model, values: &[S]) -> Vec<Vec<S>> {
     let time: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
     let levels = [6.0, -2.5, 0.4, 0.0, -7.0, 3.0, -0.2];
     let volts = (0..400).flat_map(|k| [levels[k / 40 % 7], levels[k / 25 % 7]]);
@@ -27,7 +27,7 @@ fn simulate(model: &Model, values: &[f64]) -> Vec<Vec<f64>> {
     let measured = Rows::new(2, vec![f64::NAN; 800]);
     let run = Run::new("levels", time, inputs, measured).unwrap();
     let mut all = Vec::new();
-    let x0 = vec![0.0; model.n_states()];
+    let x0 = vec![S::of(0.0); model.n_states()];
     let mut simulator = Simulator::new(model, values);
     free_run(&mut simulator, &x0, &run, |_, y| all.push(y.to_vec()));
     all
@@ -84,6 +84,58 @@ fn no_step_is_stretched_until_it_is_unstable() {
     }
     let speed = simulator.state()[0];
     assert!((speed - 1.0).abs() < 1e-9, "{speed}");
+}
+
+/// Steps by the motion are chosen by values alone, so a simulation and its derivatives take the same ones. A step more would
+/// show in the seventh digit.
+#[test]
+fn derivatives_take_the_steps_of_the_values() {
+    let friction = "[[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\"]\nlevel = 0.7\n";
+    let seen = "[log.measured.linear_velocity]\nsensor = \"instantaneous\"\n\
+                [log.measured.angular_velocity]\nsensor = \"interval_mean\"\n";
+    let usual = model(&format!("{DDMR}{friction}{seen}"));
+    let by_motion = usual.clone().with_steps_by_motion();
+    let mut values: Vec<Dual> = usual.values().into_iter().map(Dual::of).collect();
+    values[0] = variable(values[0].value(), 0);
+    let found = simulate(&by_motion, &by_motion.values());
+    let with_derivatives = simulate(&by_motion, &values);
+    let off = |a: &[f64], b: &[Dual]| {
+        let off = a.iter().zip(b).map(|(a, b)| (a - b.value()).abs());
+        off.fold(0.0, f64::max)
+    };
+    let most = |rows: &[Vec<f64>]| {
+        let off = rows.iter().zip(&with_derivatives).map(|(a, b)| off(a, b));
+        off.fold(0.0, f64::max)
+    };
+    assert!(most(&found) < 1e-12, "{}", most(&found));
+    assert!(most(&simulate(&usual, &usual.values())) > 1e-8);
+}
+
+/// A machine that sharp friction holds at rest has no motion to choose steps by, and one that is too long for the friction would
+/// not show in its values: the derivative by an offset of the input is that of the usual steps.
+#[test]
+fn derivatives_do_not_grow_at_rest() {
+    let at_rest = "[[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\", \"wheel.left\"]\n\
+                   level = 1.5\nwidth = 0.03\n[[effect]]\n[effect.input_offset]\nat = [\"input.right\"]\n\
+                   [log.measured.linear_velocity]\nsensor = \"instantaneous\"\n";
+    let usual = model(&format!("{DDMR}{at_rest}"));
+    let mut values: Vec<Dual> = usual.values().into_iter().map(Dual::of).collect();
+    let offset = usual
+        .parameters
+        .iter()
+        .position(|p| p.name.ends_with("offset"));
+    values[offset.unwrap()] = variable(0.0, 0);
+    let slope = |model: &Model| {
+        let mut simulator = Simulator::new(model, &values);
+        for k in 1..=200 {
+            simulator.advance(0.01 * f64::from(k), &[0.0, 0.0]);
+        }
+        derivative(&simulator.state()[0], 0)
+    };
+    let (by_motion, usual) = (slope(&usual.clone().with_steps_by_motion()), slope(&usual));
+    assert!(usual != 0.0);
+    let off = (by_motion / usual - 1.0).abs();
+    assert!(off < 1e-6, "{by_motion} {usual}");
 }
 
 /// A speed at rest under friction, and its derivative by the speed at the start, die out, and do not go on to numbers with

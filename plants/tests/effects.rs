@@ -314,6 +314,20 @@ fn long_steps_follow_every_effect() {
     });
 }
 
+/// A search takes steps as long as the motion allows, and they follow every effect.
+#[test]
+fn steps_by_the_motion_follow_every_effect() {
+    let mut longer = 0;
+    each_case(|name, with, own, _| {
+        let values = noticeable(&with, own);
+        let usual = simulate(&with, &values);
+        let off = difference(&simulate(&with.with_steps_by_motion(), &values), &usual);
+        assert!(off <= 2e-4, "{name}: {off}");
+        longer += usize::from(off > 0.0);
+    });
+    assert!(longer > 100, "{longer}");
+}
+
 /// Where a fit starts from neutral, it must see which way to go.
 #[test]
 fn a_fit_can_leave_the_defaults() {

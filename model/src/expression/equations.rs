@@ -10,7 +10,7 @@ use super::tree::{Slot, Tree};
 use super::{ExpressionError, Names, placed};
 use crate::config::{Mistake, PathSegment};
 use crate::{Dual, NarrowDual, TinyDual};
-use loopsight_core::{Dynamics, Real, Steps, rk4_step};
+use loopsight_core::{Dynamics, Real, Steps, steps_alone};
 
 const PARAMETERS: u8 = FIRST_BANK;
 const STATES: u8 = FIRST_BANK + 1;
@@ -312,17 +312,14 @@ macro_rules! dynamics {
                 u: &[$scalar],
                 w: &[$scalar],
                 p: &[$scalar],
-            ) {
-                let h = span.length;
-                for _ in 0..span.count {
-                    match x.len() {
-                        0..=2 => self.step_in::<$scalar, 2>(x, h, u, w, p),
-                        3..=4 => self.step_in::<$scalar, 4>(x, h, u, w, p),
-                        5..=6 => self.step_in::<$scalar, 6>(x, h, u, w, p),
-                        7..=8 => self.step_in::<$scalar, 8>(x, h, u, w, p),
-                        9..=16 => self.step_in::<$scalar, 16>(x, h, u, w, p),
-                        _ => self.step_in::<$scalar, MOST>(x, h, u, w, p),
-                    }
+            ) -> f64 {
+                match x.len() {
+                    0..=2 => self.steps_in::<$scalar, 2>(x, span, u, w, p),
+                    3..=4 => self.steps_in::<$scalar, 4>(x, span, u, w, p),
+                    5..=6 => self.steps_in::<$scalar, 6>(x, span, u, w, p),
+                    7..=8 => self.steps_in::<$scalar, 8>(x, span, u, w, p),
+                    9..=16 => self.steps_in::<$scalar, 16>(x, span, u, w, p),
+                    _ => self.steps_in::<$scalar, MOST>(x, span, u, w, p),
                 }
             }
 
@@ -350,19 +347,27 @@ macro_rules! dynamics {
 dynamics!(f32, f64, Dual, NarrowDual, TinyDual);
 
 impl Law {
-    /// One step in room for `N` states.
-    fn step_in<S: Real, const N: usize>(&self, x: &mut [S], h: S, u: &[S], w: &[S], p: &[S])
+    /// Steps in room for `N` states.
+    fn steps_in<S: Real, const N: usize>(
+        &self,
+        x: &mut [S],
+        span: Steps<S>,
+        u: &[S],
+        w: &[S],
+        p: &[S],
+    ) -> f64
     where
         Program: Numbers<S>,
     {
         let n = x.len().min(N);
         let mut padded = [S::zero(); N];
         padded[..n].copy_from_slice(&x[..n]);
-        rk4_step(&mut padded, h, |x: &[S; N]| {
+        let bend = steps_alone(&mut padded, span, |x: &[S; N]| {
             let mut dx = [S::zero(); N];
             self.rates.run(&[p, &x[..n], u, w], &mut dx);
             dx
         });
         x[..n].copy_from_slice(&padded[..n]);
+        bend
     }
 }

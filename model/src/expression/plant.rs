@@ -339,7 +339,9 @@ struct Nothing;
 
 impl<S: Real> Dynamics<S> for Nothing {
     fn derivative(&self, _x: &[S], _u: &[S], _w: &[S], _p: &[S], _dx: &mut [S]) {}
-    fn steps(&self, _x: &mut [S], _span: Steps<S>, _u: &[S], _w: &[S], _p: &[S]) {}
+    fn steps(&self, _x: &mut [S], _span: Steps<S>, _u: &[S], _w: &[S], _p: &[S]) -> f64 {
+        1.0
+    }
     fn output(&self, _index: usize, _x: &[S], _u: &[S], _p: &[S]) -> S {
         S::zero()
     }

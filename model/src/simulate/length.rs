@@ -16,6 +16,8 @@ pub(super) struct Length {
     pub(super) usual: f64,
     /// No step is longer.
     pub(super) longest: f64,
+    /// Whether neither the file nor an effect says how long they may be.
+    pub(super) free: bool,
 }
 
 impl Length {
@@ -27,6 +29,7 @@ impl Length {
         Self {
             usual: longest,
             longest: if asked { longest } else { STRETCH * longest },
+            free: !asked,
         }
     }
 
@@ -63,6 +66,7 @@ mod tests {
     const USUAL: Length = Length {
         usual: 2.5e-3,
         longest: 3.125e-3,
+        free: true,
     };
 
     #[test]

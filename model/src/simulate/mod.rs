@@ -1,6 +1,7 @@
 //! Simulation of a composed model: the free run.
 
 pub(crate) mod bound;
+mod by_motion;
 mod follow;
 mod foresee;
 pub(crate) mod history;
@@ -17,6 +18,7 @@ mod state_observer;
 mod step;
 mod stiff;
 mod values;
+mod watch;
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -36,6 +38,7 @@ use push::Pushed;
 use sensing::{Integral, Sensing, sense};
 pub use state_observer::StateObserver;
 use stiff::{Implicit, Way};
+use watch::Watched;
 
 /// Integrates a model through time.
 ///
@@ -76,6 +79,8 @@ pub struct Simulator<'m, S> {
     interval: f64,
     /// How long the integration steps are.
     length: Length,
+    /// Steps as long as the motion allows, in a search.
+    watched: Watched<S>,
     /// Steps longer than that where the samples are far apart and the motion allows them; none where the
     /// file gives the step.
     lengthened: Option<Lengthened<S>>,
@@ -200,6 +205,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
             time: 0.0,
             interval: 0.0,
             length: Length::of(&model),
+            watched: Watched::new(),
             lengthened,
             slopes: vec![0.0; nu],
             ramped: (0..nu)
@@ -356,6 +362,8 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         let steps = self.length.steps(span);
         if self.lengthens(steps) {
             self.advance_lengthened(input, span, steps);
+        } else if steps > 1 && self.goes_by_motion() {
+            self.advance_by_motion(input, span, steps);
         } else {
             self.integrate(input, span, steps, true);
         }

@@ -11,25 +11,27 @@ const WIDE: f64 = 1e9;
 
 impl<S: HostReal> Simulator<'_, S> {
     /// Makes the longest step so short that it is stable where dry friction holds the machine at rest, and lets none be longer
-    /// than usual that would not be stable.
+    /// than usual, or as long as the motion allows, that would not be stable.
     ///
     /// There friction of `F` that is smoothed over `w` is a damper of `F/w`: it is the fastest that the machine knows,
     /// and a step that is too long for it makes the speed jump about zero within the width. The values hardly show it,
     /// but the derivatives by parameters grow without end.
     pub(super) fn shorten(&mut self) {
-        // Steps longer than usual are those of a first look, which only finds the way.
-        let coarse = self.model.max_step > self.model.usual_step();
-        if self.model.step_given || coarse {
+        if self.model.step_given {
             return;
         }
+        // Steps longer than usual are those of a first look, which only finds the way.
+        let coarse = self.model.max_step > self.model.usual_step();
         let widths: Vec<usize> = (0..self.model.parameters.len())
             .filter(|i| self.model.parameters[*i].declaration.is_width())
             .collect();
-        if widths.is_empty() && !self.length.stretches() {
+        let as_usual = coarse || widths.is_empty() && !self.length.stretches();
+        if as_usual && !self.model.by_motion {
             return;
         }
         let sticking = self.fastest_at_rest();
-        if self.length.longest * sticking <= STABLE {
+        self.watched.longest = STABLE / sticking;
+        if as_usual || self.length.longest * sticking <= STABLE {
             return;
         }
         let kept = self.values.clone();

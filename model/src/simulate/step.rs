@@ -43,6 +43,7 @@ impl<S: HostReal> Simulator<'_, S> {
             slopes,
             foreseen,
             trail,
+            watched,
             ..
         } = self;
         let model: &Model = model;
@@ -99,13 +100,15 @@ impl<S: HostReal> Simulator<'_, S> {
             let span = Steps {
                 count: steps,
                 length: S::of(h),
+                watched: watched.now,
             };
             if plan.alone {
-                if *trail {
-                    dynamics.steps(x, span, u, w, p);
+                let bend = if *trail {
+                    dynamics.steps(x, span, u, w, p)
                 } else {
-                    dynamics.steps_of_motion(x, span, u, w, p);
-                }
+                    dynamics.steps_of_motion(x, span, u, w, p)
+                };
+                watched.bend = watched.bend.max(bend);
                 return;
             }
             let under = Under {
@@ -127,7 +130,8 @@ impl<S: HostReal> Simulator<'_, S> {
                     group.act(&now, values, w, &mut []);
                 }
             };
-            if dynamics.steps_under(x, &under, signals, &mut act) {
+            if let Some(bend) = dynamics.steps_under(x, &under, signals, &mut act) {
+                watched.bend = watched.bend.max(bend);
                 return;
             }
         }
@@ -207,6 +211,7 @@ impl<S: HostReal> Simulator<'_, S> {
                 }
             };
             match way {
+                Way::Explicit if watched.now => watched.step(rk4, x, h, rates),
                 Way::Explicit => rk4.step(x, S::of(h), rates),
                 Way::Implicit => implicit.step(x, h, rates),
                 Way::Linearise => implicit.linearise(x, rates),
