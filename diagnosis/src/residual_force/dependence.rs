@@ -3,17 +3,13 @@
 use std::f64::consts::TAU;
 
 use loopsight_core::Role;
-use loopsight_model::model::Model;
-use loopsight_model::run::Run;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::blocks::Blocks;
-use super::filter::Filtered;
 use super::place::{Group, Law};
-use super::response::{Column, Responses, responses};
+use super::response::{Column, Following, Responses, responses};
 use super::shape::Variable;
-use crate::prediction::Solution;
 use crate::progress::{Cancelled, Work};
 
 /// Bins of a quantity.
@@ -65,10 +61,7 @@ pub struct ForceBin {
 
 /// The model as the filter followed it through the measurements.
 pub(super) struct Followed<'a> {
-    pub(super) model: &'a Model,
-    pub(super) solution: &'a Solution,
-    pub(super) runs: &'a [Run],
-    pub(super) filtered: &'a [Filtered],
+    pub(super) following: Following<'a>,
     /// White innovations that a force should explain, and the sum of squares that noise alone would give.
     pub(super) innovations: &'a nalgebra::DVector<f64>,
     pub(super) noise: f64,
@@ -138,20 +131,13 @@ fn dependence(
         }
         sorted.push(part);
     }
-    let Responses { columns: found, .. } = responses(
-        followed.model,
-        followed.solution,
-        followed.runs,
-        followed.filtered,
-        &columns,
-        work,
-    )?;
+    let Responses { columns: found, .. } = responses(&followed.following, &columns, work)?;
     let blocks = Blocks::new(
         &Responses {
             innovations: followed.innovations.clone(),
             columns: found,
         },
-        followed.runs,
+        followed.following.runs,
         RIDGE,
         work,
     )?;

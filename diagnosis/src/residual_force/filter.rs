@@ -5,10 +5,10 @@ use loopsight_model::model::{Model, pseudo_inverse};
 use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
 use loopsight_model::simulate::Simulator;
-use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::linear::Linear;
 use crate::criteria::LogCriteria;
 use crate::floor::{Part, noise};
 use crate::prediction::Solution;
@@ -91,7 +91,7 @@ pub(super) fn filter(
 }
 
 /// Places of the unknown force, with their sizes.
-fn unknowns(model: &Model) -> Vec<(Place, f64)> {
+pub(super) fn unknowns(model: &Model) -> Vec<(Place, f64)> {
     let of = |effort: bool| {
         model
             .plant
@@ -110,67 +110,6 @@ fn unknowns(model: &Model) -> Vec<(Place, f64)> {
         of(false)
     } else {
         efforts
-    }
-}
-
-/// The plant's step from a corrected state, with derivatives by the state and the unknowns.
-struct Linear<'m> {
-    places: Vec<Place>,
-    simulators: Vec<Simulator<'m, Dual>>,
-    measured: usize,
-}
-
-impl<'m> Linear<'m> {
-    fn new(bare: &'m Model, values: &[f64], places: Vec<Place>, x0: &[f64], input: &[f64]) -> Self {
-        let dual = |from: &[f64]| from.iter().map(|v| Dual::of(*v)).collect::<Vec<_>>();
-        let columns = x0.len() + places.len();
-        let simulators = (0..columns.div_ceil(DUAL_WIDTH))
-            .map(|_| {
-                let mut simulator = Simulator::new(bare, &dual(values));
-                simulator.reset(&dual(x0), input);
-                simulator
-            })
-            .collect();
-        Self {
-            places,
-            simulators,
-            measured: bare.measured.len(),
-        }
-    }
-
-    /// `[A B]`, rows: states, then measured signals.
-    fn step(&mut self, x: &[f64], run: &Run, k: usize) -> DMatrix<f64> {
-        let (until, input) = (run.time()[k] - run.time()[0], run.input(k - 1));
-        let nx = x.len();
-        let columns = nx + self.places.len();
-        let mut jacobian = DMatrix::zeros(nx + self.measured, columns);
-        let mut outputs = vec![Dual::of(0.0); self.measured];
-        for (batch, simulator) in self.simulators.iter_mut().enumerate() {
-            let first = batch * DUAL_WIDTH;
-            let last = (first + DUAL_WIDTH).min(columns);
-            let seed = |value: f64, column: usize| {
-                if (first..last).contains(&column) {
-                    variable(value, column - first)
-                } else {
-                    Dual::of(value)
-                }
-            };
-            for (i, (to, value)) in simulator.state_mut().iter_mut().zip(x).enumerate() {
-                *to = seed(*value, i);
-            }
-            for (i, place) in self.places.iter().enumerate() {
-                simulator.push(*place, seed(0.0, nx + i));
-            }
-            simulator.foresee(run, k);
-            simulator.advance(until, input);
-            simulator.measure(&mut outputs);
-            for column in first..last {
-                for (row, value) in simulator.state().iter().chain(&outputs).enumerate() {
-                    jacobian[(row, column)] = derivative(value, column - first);
-                }
-            }
-        }
-        jacobian
     }
 }
 

@@ -5,10 +5,12 @@ mod blocks;
 mod dependence;
 mod filter;
 mod known;
+mod linear;
 mod place;
 mod response;
 mod select;
 mod shape;
+mod system;
 mod words;
 
 use loopsight_model::model::Model;
@@ -27,8 +29,9 @@ use blocks::Blocks;
 use dependence::{Followed, dependences};
 use filter::filter;
 use place::{Group, Way, groups};
-use response::{Column, responses};
+use response::{Column, Following, responses};
 use select::{Chosen, select};
+use system::System;
 use words::{statement, written};
 
 /// Most samples that are used: they are enough to show what a force depends on.
@@ -114,7 +117,14 @@ pub(crate) fn of_solution(
         .collect();
     let known: Vec<usize> = (0..parameters.len()).collect();
     let bend: Vec<Column> = parameters.iter().map(|i| Column::Parameter(*i)).collect();
-    let bent = responses(model, solution, runs, &filtered, &bend, work)?;
+    let mut following = Following {
+        model,
+        solution,
+        runs,
+        filtered: &filtered,
+        system: None,
+    };
+    let bent = responses(&following, &bend, work)?;
 
     let spread = noise * (2.0 / bent.innovations.len().max(1) as f64).sqrt();
     let blocks = Blocks::new(&bent, runs, RIDGE, work)?;
@@ -124,9 +134,11 @@ pub(crate) fn of_solution(
         return Ok(None);
     }
 
+    let system = System::of(model, solution, runs, &filtered, work)?;
+    following.system = system.as_ref();
     let mut best: Option<Found> = None;
     for group in groups(model, runs, &filtered) {
-        let forces = responses(model, solution, runs, &filtered, &group.columns(), work)?;
+        let forces = responses(&following, &group.columns(), work)?;
         let blocks = Blocks::new(&group.joined(&bent, &forces), runs, RIDGE, work)?;
         for way in group.ways.clone() {
             let choices = group.choices(way, known.len());
@@ -170,10 +182,7 @@ pub(crate) fn of_solution(
     };
     let at = found.group.at(found.way);
     let followed = Followed {
-        model,
-        solution,
-        runs,
-        filtered: &filtered,
+        following,
         innovations: &innovations,
         noise,
     };
