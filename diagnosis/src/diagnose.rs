@@ -56,6 +56,7 @@ pub fn diagnose(
     let aim = Aim {
         least: work.criteria().missing.least_share,
         discover: Discover::Never,
+        force: true,
     };
     let mut diagnosis = diagnose_for(model, measurements, aim, work)?;
     match pair(&diagnosis, measurements, aim, work) {
@@ -72,6 +73,8 @@ pub(crate) struct Aim {
     /// Least share of the standard deviation that an explanation must account for.
     pub(crate) least: f64,
     pub(crate) discover: Discover,
+    /// Whether it says what force is missing where no effect explains the rest.
+    pub(crate) force: bool,
 }
 
 /// When an expression for the residual force is a candidate.
@@ -242,7 +245,7 @@ fn conclude_from(
         least: aim.least,
     };
     let mut verdict = conclude(diagnosis, &finalists, &evidence);
-    if verdict == Conclusion::UnknownEffect {
+    if verdict == Conclusion::UnknownEffect && aim.force {
         work.tell(Stage::ResidualForce, 0, 1);
         let force = residual_force::of_solution(nominal.model, nominal.solution, runs, true, work)?;
         let expression = force.as_ref().and_then(|f| f.expression.as_ref());

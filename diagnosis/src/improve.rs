@@ -170,6 +170,7 @@ impl State {
         Aim {
             least: first.map_or(least, |nrmse| (worth * nrmse).max(least)),
             discover: self.discover,
+            force: true,
         }
     }
 

@@ -36,8 +36,10 @@ pub(crate) fn pair(
     if diagnosis.verdict != Conclusion::UnknownEffect && !names_a_stand_in(diagnosis, criteria) {
         return Ok(None);
     }
+    // Of a second effect that is not found, nothing is said.
     let aim = Aim {
         discover: Discover::Never,
+        force: false,
         ..aim
     };
     let mut best: Option<(f64, Pair)> = None;
