@@ -123,6 +123,32 @@ pub fn steps_alone<S: Real, A: Array<S>>(x: &mut A, span: Steps<S>, rate: impl F
     most
 }
 
+/// The same of the plant `P`, from slices.
+#[doc(hidden)]
+#[inline(always)]
+pub fn steps_of<P, S>(
+    x: &mut [S],
+    span: Steps<S>,
+    u: &[S],
+    w: &[S],
+    p: &[S],
+    rate: impl Fn(&P::State<S>, &P::Input<S>, &P::Effort<S>, &P::Parameters<S>) -> P::State<S>,
+) -> f64
+where
+    P: Plant,
+    S: Real,
+{
+    let (Some(x), Some(u), Some(w), Some(p)) = (
+        P::State::<S>::from_mut_slice(x),
+        P::Input::<S>::from_slice(u),
+        P::Effort::<S>::from_slice(w),
+        P::Parameters::<S>::from_slice(p),
+    ) else {
+        return 1.0;
+    };
+    steps_alone(x, span, |x| rate(x, u, w, p))
+}
+
 /// [`Dynamics::steps_under`] of the plant `P` whose states change at this `rate`.
 #[doc(hidden)]
 #[inline(always)]
@@ -221,17 +247,8 @@ macro_rules! declare_plant {
                 w: &[S],
                 p: &[S],
             ) -> f64 {
-                let (Some(x), Ok(u), Ok(w), Ok(p)) = (
-                    <<$plant as $crate::PlantArrays>::State<S> as $crate::Array<S>>::from_mut_slice(x),
-                    u.try_into(),
-                    w.try_into(),
-                    p.try_into(),
-                ) else {
-                    return 1.0;
-                };
-                $crate::steps_alone(x, span, |x| {
-                    <$plant as $crate::Plant>::derivative::<S>(x, u, w, p)
-                })
+                let rate = <$plant as $crate::Plant>::derivative::<S>;
+                $crate::steps_of::<$plant, S>(x, span, u, w, p, rate)
             }
             fn steps_under(
                 &self,
@@ -286,17 +303,8 @@ macro_rules! declare_plant {
                 if <$plant as $crate::Plant>::TRAIL.is_empty() {
                     return $crate::Dynamics::steps(self, x, span, u, w, p);
                 }
-                let (Some(x), Ok(u), Ok(w), Ok(p)) = (
-                    <<$plant as $crate::PlantArrays>::State<S> as $crate::Array<S>>::from_mut_slice(x),
-                    u.try_into(),
-                    w.try_into(),
-                    p.try_into(),
-                ) else {
-                    return 1.0;
-                };
-                $crate::steps_alone(x, span, |x| {
-                    <$plant as $crate::Plant>::motion::<S>(x, u, w, p)
-                })
+                let rate = <$plant as $crate::Plant>::motion::<S>;
+                $crate::steps_of::<$plant, S>(x, span, u, w, p, rate)
             }
             fn output(&self, index: usize, x: &[S], u: &[S], p: &[S]) -> S {
                 let (Ok(x), Ok(u), Ok(p)) = (x.try_into(), u.try_into(), p.try_into()) else {

@@ -97,7 +97,7 @@ pub use derived::Derived;
 pub use driver::{Driver, DriverError, DriverFault, Sample};
 pub use dynamics::{Act, Dynamics, Steps, Under};
 #[doc(hidden)]
-pub use dynamics::{steps_alone, steps_under};
+pub use dynamics::{steps_alone, steps_of, steps_under};
 pub use effect::{Effect, EffectArrays, EffectMeta, NoPast, Past, Reading, Shows};
 pub use estimator::{Estimator, Innovation};
 pub use integrator::{Bend, Rk4, rk4_step, substeps};
