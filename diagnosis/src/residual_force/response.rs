@@ -180,6 +180,7 @@ mod tests {
     use loopsight_plants as _;
 
     use super::*;
+    use crate::chance::uniform;
     use crate::residual_force::filter::{filter, unknowns};
 
     const ROBOT: &str = "[plant.ddmr]\nK_A = -15.146\nK_B = 0.005\nK_C = 0.136\nK_D = -9.573\nK_E = -3.945\n\
@@ -197,11 +198,7 @@ mod tests {
 
     /// Two runs with time stamps that scatter, some of whose samples are missing.
     fn runs() -> Vec<Run> {
-        let mut at_random = 1u64;
-        let mut random = || {
-            at_random = at_random.wrapping_mul(6364136223846793005).wrapping_add(1);
-            (at_random >> 33) as f64 / f64::from(1u32 << 31) - 0.5
-        };
+        let mut random = uniform(1);
         let mut run = |n: usize| {
             let time = (0..n).map(|k| 0.01 * (k as f64 + 0.3 * random()));
             let time: Vec<f64> = time.collect();
