@@ -13,6 +13,7 @@ use crate::{Array, Real};
 /// assert_eq!(substeps(0.0100000001, 0.0025), 4);
 /// assert_eq!(substeps(0.011, 0.0025), 5);
 /// ```
+#[inline]
 pub fn substeps(span: f64, longest: f64) -> usize {
     let ratio = span / longest;
     if !(ratio > 1.0 && ratio.is_finite()) {
@@ -22,8 +23,8 @@ pub fn substeps(span: f64, longest: f64) -> usize {
     let ratio = ratio - 1e-6;
     if ratio < 1e6 {
         // Rounded up; cheaper than the library's on a machine that has no instruction for it.
-        let whole = ratio as usize;
-        (whole + usize::from(ratio > whole as f64)).max(1)
+        let whole = ratio as u32;
+        (whole + u32::from(ratio > f64::from(whole))).max(1) as usize
     } else {
         1_000_000
     }

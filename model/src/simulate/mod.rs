@@ -378,7 +378,13 @@ impl<'m, S: HostReal> Simulator<'m, S> {
     /// where it is to `remember`.
     fn integrate(&mut self, input: &[f64], span: f64, steps: usize, remember: bool) {
         let start = self.time;
-        let h = span / steps as f64;
+        // By the usual numbers without a division, which would wait for the number: to the same digits.
+        let h = match steps {
+            1 => span,
+            2 => 0.5 * span,
+            4 => 0.25 * span,
+            _ => span / steps as f64,
+        };
         let remember = remember && !self.bounds.output_memory.is_empty();
         if !remember && self.is_even() {
             self.apply(input, 0.0);

@@ -75,7 +75,6 @@ impl<S: HostReal> Simulator<'_, S> {
         for (held, push) in scratch.held.iter_mut().zip(&pushed.inputs) {
             *held += *push;
         }
-        scratch.w.copy_from_slice(&pushed.efforts);
         let (nx, nu) = (model.n_states(), model.plant.inputs.len());
         let dynamics = S::dynamics(model.dynamics);
         let Scratch {
@@ -85,7 +84,9 @@ impl<S: HostReal> Simulator<'_, S> {
             signals,
         } = scratch;
         let changing = ramping || !plan.steady;
-        if !changing {
+        // Nothing is copied for effects that are not there.
+        let kept = !changing && plan.inputs.is_empty();
+        if !changing && !kept {
             u.copy_from_slice(held);
             let now = Now {
                 time: from,
@@ -96,21 +97,27 @@ impl<S: HostReal> Simulator<'_, S> {
                 group.act(&now, values, u, &mut []);
             }
         }
-        if *way == Way::Explicit && !plan.beside && pushed.rates.is_empty() && !ramping {
-            let span = Steps {
-                count: steps,
-                length: S::of(h),
-                watched: watched.now,
+        let offered = *way == Way::Explicit && !plan.beside && pushed.rates.is_empty() && !ramping;
+        let span = Steps {
+            count: steps,
+            length: S::of(h),
+            watched: watched.now,
+        };
+        if offered && plan.alone {
+            let (u, w) = (if kept { held } else { u }, &pushed.efforts);
+            let bend = if *trail {
+                dynamics.steps(x, span, u, w, p)
+            } else {
+                dynamics.steps_of_motion(x, span, u, w, p)
             };
-            if plan.alone {
-                let bend = if *trail {
-                    dynamics.steps(x, span, u, w, p)
-                } else {
-                    dynamics.steps_of_motion(x, span, u, w, p)
-                };
-                watched.bend = watched.bend.max(bend);
-                return;
-            }
+            watched.bend = watched.bend.max(bend);
+            return;
+        }
+        if kept {
+            u.copy_from_slice(held);
+        }
+        w.copy_from_slice(&pushed.efforts);
+        if offered {
             let under = Under {
                 span,
                 u,
