@@ -112,7 +112,8 @@ fn derivatives_take_the_steps_of_the_values() {
 }
 
 /// A machine that sharp friction holds at rest has no motion to choose steps by, and one that is too long for the friction would
-/// not show in its values: the derivative by an offset of the input is that of the usual steps.
+/// not show in its values: the derivative by an offset of the input is that of the usual steps. So it is where one wheel sticks
+/// while the other one turns.
 #[test]
 fn derivatives_do_not_grow_at_rest() {
     let at_rest = "[[effect]]\n[effect.coulomb_friction]\nat = [\"wheel.right\", \"wheel.left\"]\n\
@@ -125,17 +126,20 @@ fn derivatives_do_not_grow_at_rest() {
         .iter()
         .position(|p| p.name.ends_with("offset"));
     values[offset.unwrap()] = variable(0.0, 0);
-    let slope = |model: &Model| {
+    let slope = |model: &Model, volts: [f64; 2]| {
         let mut simulator = Simulator::new(model, &values);
         for k in 1..=200 {
-            simulator.advance(0.01 * f64::from(k), &[0.0, 0.0]);
+            simulator.advance(0.01 * f64::from(k), &volts);
         }
         derivative(&simulator.state()[0], 0)
     };
-    let (by_motion, usual) = (slope(&usual.clone().with_steps_by_motion()), slope(&usual));
-    assert!(usual != 0.0);
-    let off = (by_motion / usual - 1.0).abs();
-    assert!(off < 1e-6, "{by_motion} {usual}");
+    let by_motion = usual.clone().with_steps_by_motion();
+    for volts in [[0.0, 0.0], [0.5, 6.0]] {
+        let (by_motion, usual) = (slope(&by_motion, volts), slope(&usual, volts));
+        assert!(usual != 0.0);
+        let off = (by_motion / usual - 1.0).abs();
+        assert!(off < 1e-6, "{volts:?}: {by_motion} {usual}");
+    }
 }
 
 /// A speed at rest under friction, and its derivative by the speed at the start, die out, and do not go on to numbers with

@@ -44,6 +44,20 @@ impl Bound {
         named.chain(self.signals.iter().copied()).chain(own)
     }
 
+    /// Its parameters, by index, that are widths over which the sign of a speed is smoothed.
+    pub(super) fn widths<'m>(&self, model: &'m Model) -> impl Iterator<Item = usize> + 'm {
+        let own = self.parameters.clone();
+        own.filter(|i| model.parameters[*i].declaration.is_width())
+    }
+
+    /// The speeds that it reads, as signals by index.
+    pub(super) fn speeds(&self) -> impl Iterator<Item = usize> + '_ {
+        let roles = [Role::Flow, Role::Forward, Role::Yaw];
+        roles
+            .into_iter()
+            .filter_map(|role| self.reads[role as usize])
+    }
+
     /// Whether the effect knows its input already, where so many samples of a run are `foreseen`.
     pub(super) fn knows_ahead(&self, foreseen: usize) -> bool {
         foreseen > 0 && self.ahead > 0.0

@@ -20,7 +20,8 @@ impl<S: HostReal> Simulator<'_, S> {
     ///
     /// The stages of a step say whether it was short enough ([`Dynamics::steps`](loopsight_core::Dynamics::steps)), so one that
     /// was costs nothing beside itself. After one that was not, as many are made as its bend asks for. None is longer than what
-    /// is stable where the machine is held at rest: nothing bends there, and the derivatives would grow.
+    /// is stable, and that is little where a speed is so slow that dry friction may hold the machine: nothing bends there, and
+    /// the derivatives would grow.
     pub(super) fn advance_by_motion(&mut self, input: &[f64], span: f64, most: usize) {
         // A late sensor needs points of its past, and the stages do not see an input change that comes late.
         if !self.bounds.output_memory.is_empty() || self.changes_late(span) {
@@ -28,7 +29,9 @@ impl<S: HostReal> Simulator<'_, S> {
         }
         self.watched.now = true;
         self.watched.before.clone_from(&self.x);
-        let least = substeps(span, self.watched.longest).min(most);
+        let [at_rest, beyond] = self.watched.stable;
+        let longest = if self.may_stick() { at_rest } else { beyond };
+        let least = substeps(span, longest).min(most);
         let mut steps = self.watched.steps.clamp(least, most);
         loop {
             self.watched.bend = 0.0;
@@ -47,6 +50,17 @@ impl<S: HostReal> Simulator<'_, S> {
         self.watched.now = false;
         let longer = 4.0 * self.watched.bend <= BEND;
         self.watched.steps = if longer { (steps / 2).max(1) } else { steps };
+    }
+
+    /// Whether dry friction may hold some part of the machine: a speed is so slow that its sign has a slope.
+    fn may_stick(&mut self) -> bool {
+        if self.watched.slow.is_empty() {
+            return false;
+        }
+        self.refresh();
+        let signals = &self.scratch.signals;
+        let fast = |(speed, far): &(usize, f64)| signals[*speed].value().abs() > *far;
+        !self.watched.slow.iter().all(fast)
     }
 
     /// Whether an input that effects take from its past changes within the next `span`.

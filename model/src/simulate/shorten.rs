@@ -8,6 +8,9 @@ use crate::registry::HostReal;
 const SHORTEST: f64 = 1.0 / 64.0;
 /// What a width is multiplied by, so that its effect has no slope.
 const WIDE: f64 = 1e9;
+/// Widths beyond which a speed is so far from rest that nothing sticks: a sign that is a hyperbolic tangent has a slope of 8e-9
+/// of that at rest there.
+const FAR: f64 = 10.0;
 
 impl<S: HostReal> Simulator<'_, S> {
     /// Makes the longest step so short that it is stable where dry friction holds the machine at rest, and lets none be longer
@@ -30,21 +33,55 @@ impl<S: HostReal> Simulator<'_, S> {
             return;
         }
         let sticking = self.fastest_at_rest();
-        self.watched.longest = STABLE / sticking;
+        let moving = if widths.is_empty() {
+            sticking
+        } else {
+            self.fastest_beyond(&widths)
+        };
+        self.watched.slow = self.slow();
+        let beyond = if self.watched.slow.is_empty() {
+            sticking
+        } else {
+            moving
+        };
+        self.watched.stable = [sticking, beyond].map(|rate| STABLE / rate);
         if as_usual || self.length.longest * sticking <= STABLE {
             return;
         }
-        let kept = self.values.clone();
-        for i in widths {
-            self.values[i] = self.values[i].times(S::of(WIDE));
-        }
-        let moving = self.fastest_at_rest();
-        self.values = kept;
         // What is too fast for the usual step without friction is no matter of friction.
         let usual = self.length.usual;
         let friction = usual * moving <= STABLE;
         let shortest = if friction { SHORTEST * usual } else { usual };
         self.length.limit((STABLE / sticking).max(shortest));
+    }
+
+    /// The fastest rate where signs have no slope, 1/s.
+    fn fastest_beyond(&mut self, widths: &[usize]) -> f64 {
+        let kept = self.values.clone();
+        for i in widths {
+            self.values[*i] = self.values[*i].times(S::of(WIDE));
+        }
+        let moving = self.fastest_at_rest();
+        self.values = kept;
+        moving
+    }
+
+    /// Speeds, as signals by index, and how fast each must be so that its sign has no slope; none where an effect has a sign of
+    /// something else.
+    fn slow(&self) -> Vec<(usize, f64)> {
+        let mut slow = Vec::new();
+        for bound in self.bounds.all() {
+            let widths = bound.widths(&self.model).map(|i| self.values[i].value());
+            let Some(widest) = widths.reduce(f64::max) else {
+                continue;
+            };
+            let before = slow.len();
+            slow.extend(bound.speeds().map(|speed| (speed, FAR * widest)));
+            if slow.len() == before {
+                return Vec::new();
+            }
+        }
+        slow
     }
 
     /// The fastest rate at rest, 1/s.

@@ -12,8 +12,10 @@ pub(super) struct Watched<S> {
     pub(super) bend: f64,
     /// Steps for the next interval.
     pub(super) steps: usize,
-    /// The longest that is stable [at rest](super::Simulator::shorten), s.
-    pub(super) longest: f64,
+    /// The longest that are stable [at rest](super::Simulator::shorten), and where nothing sticks, s.
+    pub(super) stable: [f64; 2],
+    /// Speeds, as signals by index, and how fast each must be so that nothing sticks.
+    pub(super) slow: Vec<(usize, f64)>,
     /// The states at the start of the interval.
     pub(super) before: Vec<S>,
     /// The rate of each state over the present step.
@@ -27,7 +29,8 @@ impl<S> Watched<S> {
             now: false,
             bend: 0.0,
             steps: 1,
-            longest: f64::INFINITY,
+            stable: [f64::INFINITY; 2],
+            slow: Vec::new(),
             before: Vec::new(),
             rates: Vec::new(),
         }
