@@ -44,10 +44,9 @@ impl Bound {
         named.chain(self.signals.iter().copied()).chain(own)
     }
 
-    /// Its parameters, by index, that are widths over which the sign of a speed is smoothed.
-    pub(super) fn widths<'m>(&self, model: &'m Model) -> impl Iterator<Item = usize> + 'm {
-        let own = self.parameters.clone();
-        own.filter(|i| model.parameters[*i].declaration.is_width())
+    /// Whether a parameter of the model, by index, is its own.
+    pub(super) fn has(&self, parameter: usize) -> bool {
+        self.parameters.contains(&parameter)
     }
 
     /// The speeds that it reads, as signals by index.

@@ -52,10 +52,11 @@ impl<S: HostReal> Simulator<'_, S> {
         self.watched.steps = if longer { (steps / 2).max(1) } else { steps };
     }
 
-    /// Whether dry friction may hold some part of the machine: a speed is so slow that its sign has a slope.
+    /// Whether dry friction may hold some part of the machine: a speed is so slow that its sign has a slope, or it is not known
+    /// which speeds have a sign.
     fn may_stick(&mut self) -> bool {
         if self.watched.slow.is_empty() {
-            return false;
+            return true;
         }
         self.refresh();
         let signals = &self.scratch.signals;

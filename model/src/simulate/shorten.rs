@@ -33,19 +33,17 @@ impl<S: HostReal> Simulator<'_, S> {
             return;
         }
         let sticking = self.fastest_at_rest();
-        let moving = if widths.is_empty() {
-            sticking
-        } else {
-            self.fastest_beyond(&widths)
-        };
-        self.watched.slow = self.slow();
-        let beyond = if self.watched.slow.is_empty() {
-            sticking
-        } else {
-            moving
-        };
-        self.watched.stable = [sticking, beyond].map(|rate| STABLE / rate);
-        if as_usual || self.length.longest * sticking <= STABLE {
+        self.watched.stable = [STABLE / sticking; 2];
+        if self.model.by_motion {
+            self.watched.slow = self.slow(&widths);
+        }
+        let stable = as_usual || self.length.longest * sticking <= STABLE;
+        if stable && self.watched.slow.is_empty() {
+            return;
+        }
+        let moving = self.fastest_beyond(&widths);
+        self.watched.stable[1] = STABLE / moving;
+        if stable {
             return;
         }
         // What is too fast for the usual step without friction is no matter of friction.
@@ -55,7 +53,7 @@ impl<S: HostReal> Simulator<'_, S> {
         self.length.limit((STABLE / sticking).max(shortest));
     }
 
-    /// The fastest rate where signs have no slope, 1/s.
+    /// The fastest rate at rest where signs have no slope, because their `widths` are so large, 1/s.
     fn fastest_beyond(&mut self, widths: &[usize]) -> f64 {
         let kept = self.values.clone();
         for i in widths {
@@ -66,13 +64,13 @@ impl<S: HostReal> Simulator<'_, S> {
         moving
     }
 
-    /// Speeds, as signals by index, and how fast each must be so that its sign has no slope; none where an effect has a sign of
-    /// something else.
-    fn slow(&self) -> Vec<(usize, f64)> {
+    /// Speeds, as signals by index, and how fast each must be so that its sign has no slope; the `widths` are those of all signs.
+    /// None where an effect has a sign of something else.
+    fn slow(&self, widths: &[usize]) -> Vec<(usize, f64)> {
         let mut slow = Vec::new();
         for bound in self.bounds.all() {
-            let widths = bound.widths(&self.model).map(|i| self.values[i].value());
-            let Some(widest) = widths.reduce(f64::max) else {
+            let own = widths.iter().filter(|i| bound.has(**i));
+            let Some(widest) = own.map(|i| self.values[*i].value()).reduce(f64::max) else {
                 continue;
             };
             let before = slow.len();

@@ -14,7 +14,7 @@ pub(super) struct Watched<S> {
     pub(super) steps: usize,
     /// The longest that are stable [at rest](super::Simulator::shorten), and where nothing sticks, s.
     pub(super) stable: [f64; 2],
-    /// Speeds, as signals by index, and how fast each must be so that nothing sticks.
+    /// Speeds, as signals by index, and how fast each must be so that nothing sticks; empty where that is not known.
     pub(super) slow: Vec<(usize, f64)>,
     /// The states at the start of the interval.
     pub(super) before: Vec<S>,
