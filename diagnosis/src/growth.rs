@@ -87,6 +87,8 @@ impl Growth {
         let mut followed = 0usize;
         let mut times = Vec::new();
         let mut rates = Vec::new();
+        let mut y = DMatrix::zeros(deviation.len(), nx);
+        let mut next = DMatrix::zeros(nx, nx);
         for path in paths {
             for start in STARTS {
                 let first = (start * path.a.len() as f64) as usize;
@@ -97,8 +99,9 @@ impl Growth {
                 let ending =
                     path.a.len() - ((path.a.len() - first) as f64 * criteria.late_share) as usize;
                 for k in first..path.a.len() {
-                    let y = &path.c[k] * &m;
-                    m = &path.a[k] * m;
+                    path.c[k].mul_to(&m, &mut y);
+                    path.a[k].mul_to(&m, &mut next);
+                    std::mem::swap(&mut m, &mut next);
                     let mut most = 0.0f64;
                     for (row, deviation) in deviation.iter().enumerate() {
                         for column in 0..nx {

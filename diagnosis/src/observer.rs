@@ -4,9 +4,10 @@ use std::borrow::Cow;
 
 use loopsight_core::Real;
 use loopsight_model::model::Model;
+use loopsight_model::registry::HostReal;
 use loopsight_model::run::{Rows, Run};
 use loopsight_model::simulate::{Simulator, StateObserver};
-use loopsight_model::{DUAL_WIDTH, Dual, derivative, variable};
+use loopsight_model::{DUAL_WIDTH, DualOf, NARROW_WIDTH, TINY_WIDTH, derivative, variable_of};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -298,37 +299,68 @@ impl<'a> Design<'a> {
         fade: f64,
         uncertain: &DMatrix<f64>,
         work: &Work<'_>,
-        mut each: impl FnMut(&Linearised<'_>),
+        each: impl FnMut(&Linearised<'_>),
     ) -> Result<Option<DMatrix<f64>>, Cancelled> {
+        let nx = self.model.n_states();
+        if nx <= TINY_WIDTH {
+            self.filter_by::<TINY_WIDTH>(run, samples, fade, uncertain, work, each)
+        } else if nx <= NARROW_WIDTH {
+            self.filter_by::<NARROW_WIDTH>(run, samples, fade, uncertain, work, each)
+        } else {
+            self.filter_by::<DUAL_WIDTH>(run, samples, fade, uncertain, work, each)
+        }
+    }
+
+    /// [`Design::filter`] with `N` derivatives at a time.
+    fn filter_by<const N: usize>(
+        &self,
+        run: &Run,
+        samples: usize,
+        fade: f64,
+        uncertain: &DMatrix<f64>,
+        work: &Work<'_>,
+        mut each: impl FnMut(&Linearised<'_>),
+    ) -> Result<Option<DMatrix<f64>>, Cancelled>
+    where
+        DualOf<N>: HostReal,
+    {
         let (nx, ny) = (self.model.n_states(), self.model.measured.len());
         let mut p = uncertain.clone();
         if run.len() < 2 {
             return Ok(Some(p));
         }
-        let values: Vec<Dual> = self.values.iter().map(|v| Dual::of(*v)).collect();
+        let dual = |value: &f64| DualOf::<N>::of(*value);
+        let values: Vec<DualOf<N>> = self.values.iter().map(dual).collect();
         // One simulator for every few states: a dual number has a fixed number of derivatives.
-        let mut simulators: Vec<Simulator<'_, Dual>> = (0..nx)
-            .step_by(DUAL_WIDTH)
+        let mut simulators: Vec<Simulator<'_, DualOf<N>>> = (0..nx)
+            .step_by(N)
             .map(|_| Simulator::new(&self.model, &values))
             .collect();
         let mut x = self.model.state_from(self.values, run.sample(0));
-        let start: Vec<Dual> = x.iter().map(|v| Dual::of(*v)).collect();
+        let start: Vec<DualOf<N>> = x.iter().map(dual).collect();
         for simulator in &mut simulators {
             simulator.reset(&start, run.input(0));
         }
-        let mut predicted = vec![Dual::of(0.0); ny];
+        let mut predicted = vec![dual(&0.0); ny];
         let (mut a, mut c) = (DMatrix::zeros(nx, nx), DMatrix::zeros(ny, nx));
         let mut innovation = DVector::zeros(ny);
+        // Their transposes, and what is between them and the gain.
+        let (mut at, mut ct) = (DMatrix::zeros(nx, nx), DMatrix::zeros(nx, ny));
+        let (mut pc, mut apc) = (DMatrix::zeros(nx, ny), DMatrix::zeros(nx, ny));
+        let (mut s, mut gain) = (DMatrix::zeros(ny, ny), DMatrix::zeros(nx, ny));
+        let (mut ks, mut kt) = (DMatrix::zeros(nx, ny), DMatrix::zeros(ny, nx));
+        let (mut ap, mut transposed) = (DMatrix::zeros(nx, nx), DMatrix::zeros(nx, nx));
+        let mut correction = DVector::zeros(nx);
         for k in 1..samples.min(run.len()) {
             work.go_on()?;
             for (block, simulator) in simulators.iter_mut().enumerate() {
-                let first = block * DUAL_WIDTH;
+                let first = block * N;
                 for (i, state) in simulator.state_mut().iter_mut().enumerate() {
-                    *state = variable(x[i], i.wrapping_sub(first));
+                    *state = variable_of(x[i], i.wrapping_sub(first));
                 }
                 simulator.advance_to(run, k);
                 simulator.measure(&mut predicted);
-                for column in first..(first + DUAL_WIDTH).min(nx) {
+                for column in first..(first + N).min(nx) {
                     for (row, state) in simulator.state().iter().enumerate() {
                         a[(row, column)] = derivative(state, column - first);
                     }
@@ -345,14 +377,26 @@ impl<'a> Design<'a> {
                 }
             }
             p *= (2.0 * (run.time()[k] - run.time()[k - 1]) / fade).exp();
-            let pc = &p * c.transpose();
-            let s = &c * &pc + DMatrix::identity(ny, ny);
+            a.transpose_to(&mut at);
+            c.transpose_to(&mut ct);
+            p.mul_to(&ct, &mut pc);
+            c.mul_to(&pc, &mut s);
+            for i in 0..ny {
+                s[(i, i)] += 1.0;
+            }
             let Some(cholesky) = s.clone().cholesky() else {
                 return Ok(None);
             };
-            let mut gain = &a * &pc * cholesky.inverse();
-            p = &a * &p * a.transpose() - &gain * &s * gain.transpose();
-            p = (&p + p.transpose()) * 0.5;
+            a.mul_to(&pc, &mut apc);
+            apc.mul_to(&cholesky.inverse(), &mut gain);
+            a.mul_to(&p, &mut ap);
+            ap.mul_to(&at, &mut p);
+            gain.mul_to(&s, &mut ks);
+            gain.transpose_to(&mut kt);
+            p.gemm(-1.0, &ks, &kt, 1.0);
+            p.transpose_to(&mut transposed);
+            p += &transposed;
+            p *= 0.5;
             for i in 0..nx {
                 let most = FURTHEST * FURTHEST * uncertain[(i, i)];
                 if p[(i, i)] > most {
@@ -362,7 +406,7 @@ impl<'a> Design<'a> {
                 }
                 p[(i, i)] = p[(i, i)].max(0.0);
             }
-            let correction = &gain * &innovation;
+            gain.mul_to(&innovation, &mut correction);
             if let Some(state) = simulators.first().map(Simulator::state) {
                 for (i, x) in x.iter_mut().enumerate() {
                     *x = state[i].value() + correction[i];
