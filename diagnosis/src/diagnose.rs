@@ -287,6 +287,7 @@ fn fit_plain(
 ) -> Result<Plain, FitError> {
     let seen = holdout.seen.as_deref();
     let mut problem = Problem::with(model, holdout.runs, seen, None, work.clone())?;
+    problem.keeps = true;
     let with = |values: &[f64]| {
         let mut fitted = model.clone();
         fitted.set_values(values);
@@ -322,7 +323,8 @@ fn solve_plain(
     let solution = problem.solution(&arrived.solution);
     let scaled = problem.pack(&solution.values, &solution.states);
     let cost = problem.residual_vector(&scaled)?.norm_squared();
-    let judgement = holdout.judge(model, &solution, work)?;
+    let known = problem.runs_of(&solution);
+    let judgement = holdout.judge(model, &solution, known.as_deref(), work)?;
     let fitted = holdout.fitted(model, &solution, &judgement.rank, work)?;
     let mut model = model.clone();
     model.set_values(&solution.values);

@@ -100,7 +100,7 @@ pub(crate) fn plain_on_all(
         let why = "the free run over the whole log diverges, where that over parts of it does not";
         return Err(FitError::Solver(why.to_owned()));
     };
-    let judgement = holdout.judge(model, &solution, work)?;
+    let judgement = holdout.judge(model, &solution, None, work)?;
     let fitted = holdout.fitted(model, &solution, &judgement.rank, work)?;
     diagnosis.nominal.nrmse = nrmse(&judgement.losses);
     diagnosis.nominal_fit = nrmse(&fitted);
@@ -128,7 +128,7 @@ pub(crate) fn finalists_on_all(
             let start = begun(&found.solution, first);
             let model = &found.candidate.model;
             let (solution, fit) = taken_on(model, &start, nominal.holdout, nominal.work).ok()??;
-            let judged = Judged::of(found.candidate.clone(), model, solution, nominal)?;
+            let judged = Judged::of(found.candidate.clone(), model, solution, None, nominal)?;
             let explanation = explain(&judged, &fit, nominal).ok()?;
             work.know(|| Finding::Finalist((&explanation).into()));
             Some((judged, explanation))

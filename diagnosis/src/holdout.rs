@@ -92,15 +92,20 @@ impl<'a> Holdout<'a> {
         }
     }
 
-    /// Losses of a solution, in one pass over the data.
+    /// Losses of a solution, in one pass over the data, whose free runs over the fitting data may be `known`.
     pub(crate) fn judge(
         &self,
         model: &Model,
         solution: &Solution,
+        known: Option<&[Vec<f64>]>,
         work: &Work<'_>,
     ) -> Result<Judgement, Cancelled> {
+        let of_runs = |std: &[f64]| match known {
+            Some(predicted) => Ok(self.losses_of(predicted, std)),
+            None => self.losses(model, solution, self.runs, std, work),
+        };
         let Some(test) = self.test else {
-            let rank = self.losses(model, solution, self.runs, &self.std_test, work)?;
+            let rank = of_runs(&self.std_test)?;
             return Ok(Judgement {
                 losses: self.part(&rank, false),
                 rank,
@@ -111,7 +116,7 @@ impl<'a> Holdout<'a> {
         let on_test = Solution { values, states };
         let losses = self.losses(model, &on_test, test, &self.std_test, work)?;
         let mut rank = losses.clone();
-        rank.extend(self.fitted_beside_test(model, solution, work)?);
+        rank.extend(self.part(&of_runs(&self.std_fit)?, true));
         Ok(Judgement { losses, rank })
     }
 
@@ -126,16 +131,7 @@ impl<'a> Holdout<'a> {
         if self.test.is_none() {
             return Ok(self.part(rank, true));
         }
-        self.fitted_beside_test(model, solution, work)
-    }
-
-    /// The same where a test recording judges, in one more pass over the data.
-    fn fitted_beside_test(
-        &self,
-        model: &Model,
-        solution: &Solution,
-        work: &Work<'_>,
-    ) -> Result<Losses, Cancelled> {
+        // A test recording was judged on, so this is one more pass over the data.
         let all = self.losses(model, solution, self.runs, &self.std_fit, work)?;
         Ok(self.part(&all, true))
     }
@@ -162,38 +158,79 @@ impl<'a> Holdout<'a> {
         std: &[f64],
         work: &Work<'_>,
     ) -> Result<Losses, Cancelled> {
-        let n = std.len();
         let mut all = Losses::new();
         for (run, x0) in runs.iter().zip(&solution.states) {
             work.count_plain(run.len());
             let mut simulator = Simulator::new(model, &solution.values).without_trail();
-            let (mut sum, mut count) = (0.0, 0usize);
+            let mut groups = Groups::new(self.group, run, std);
             try_follow(&mut simulator, x0.as_slice(), run, |k, predicted, _| {
-                let loss: f64 = (0..n)
-                    .map(|i| {
-                        let (measured, predicted) = (run.sample(k)[i], predicted[i]);
-                        let e = (measured - predicted) / std[i];
-                        // A missing sample, or a signal that never moves, counts nothing; a run that diverges
-                        // to no number at all is as wrong as can be.
-                        if !e.is_nan() {
-                            e * e
-                        } else if predicted.is_nan() && measured.is_finite() {
-                            f64::INFINITY
-                        } else {
-                            0.0
-                        }
-                    })
-                    .sum();
-                sum += loss / n as f64;
-                count += 1;
-                if count == self.group || k + 1 == run.len() {
-                    all.push(sum / count as f64);
-                    (sum, count) = (0.0, 0);
-                }
+                all.extend(groups.add(k, predicted));
                 work.go_on()
             })?;
         }
         Ok(all)
+    }
+
+    /// Losses on all samples of the fitting data, of which the free runs were `predicted`, row by row.
+    fn losses_of(&self, predicted: &[Vec<f64>], std: &[f64]) -> Losses {
+        let mut all = Losses::new();
+        for (run, predicted) in self.runs.iter().zip(predicted) {
+            let mut groups = Groups::new(self.group, run, std);
+            let rows = predicted.chunks_exact(std.len().max(1)).enumerate();
+            all.extend(rows.filter_map(|(k, row)| groups.add(k, row)));
+        }
+        all
+    }
+}
+
+/// The mean losses of groups of samples of a run.
+struct Groups<'a> {
+    /// Samples of a group; the last one may have fewer.
+    size: usize,
+    run: &'a Run,
+    /// Standard deviations of the signals.
+    std: &'a [f64],
+    sum: f64,
+    count: usize,
+}
+
+impl<'a> Groups<'a> {
+    fn new(size: usize, run: &'a Run, std: &'a [f64]) -> Self {
+        Self {
+            size,
+            run,
+            std,
+            sum: 0.0,
+            count: 0,
+        }
+    }
+
+    /// Adds sample `k`; the loss of its group where that ends.
+    fn add(&mut self, k: usize, predicted: &[f64]) -> Option<f64> {
+        let n = self.std.len();
+        let loss: f64 = (0..n)
+            .map(|i| {
+                let (measured, predicted) = (self.run.sample(k)[i], predicted[i]);
+                let e = (measured - predicted) / self.std[i];
+                // A missing sample, or a signal that never moves, counts nothing; a run that diverges
+                // to no number at all is as wrong as can be.
+                if !e.is_nan() {
+                    e * e
+                } else if predicted.is_nan() && measured.is_finite() {
+                    f64::INFINITY
+                } else {
+                    0.0
+                }
+            })
+            .sum();
+        self.sum += loss / n as f64;
+        self.count += 1;
+        if self.count < self.size && k + 1 < self.run.len() {
+            return None;
+        }
+        let mean = self.sum / self.count as f64;
+        (self.sum, self.count) = (0.0, 0);
+        Some(mean)
     }
 }
 

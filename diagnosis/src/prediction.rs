@@ -132,7 +132,7 @@ pub(crate) fn signal_rms(
 }
 
 /// The values that a fit finds, with which a model is simulated over some runs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Solution {
     /// Parameter values of the model.
     pub(crate) values: Vec<f64>,

@@ -50,6 +50,17 @@ pub(crate) struct Problem<'a> {
     pub(crate) positions: Option<Positions>,
     /// The best that was seen in the first pass, and the root of its cost.
     best: RefCell<Option<(f64, Solution)>>,
+    /// Whether the free runs of the best are kept, for who judges it.
+    pub(crate) keeps: bool,
+    kept: RefCell<Option<Kept>>,
+}
+
+/// The free runs of a solution.
+struct Kept {
+    /// The root of its cost.
+    error: f64,
+    solution: Solution,
+    predicted: Vec<Vec<f64>>,
 }
 
 impl<'a> Problem<'a> {
@@ -144,6 +155,8 @@ impl<'a> Problem<'a> {
             known_states,
             positions: None,
             best: RefCell::new(None),
+            keeps: false,
+            kept: RefCell::new(None),
         })
     }
 
@@ -254,8 +267,37 @@ impl<'a> Problem<'a> {
             all.extend_from_slice(self.weighted(index, predicted, scaled).as_slice());
         }
         let all = DVector::from_vec(all);
+        if self.keeps {
+            self.keep_runs(&all, &values, &states, predicted);
+        }
         self.remember(&all, values, states);
         Ok(all)
+    }
+
+    /// Keeps the free runs of the solution of least error.
+    fn keep_runs(
+        &self,
+        residual: &DVector<f64>,
+        values: &[f64],
+        states: &[DVector<f64>],
+        predicted: Vec<Vec<f64>>,
+    ) {
+        let error = residual.norm();
+        let mut kept = self.kept.borrow_mut();
+        if error.is_finite() && kept.as_ref().is_none_or(|best| error < best.error) {
+            let (values, states) = (values.to_vec(), states.to_vec());
+            *kept = Some(Kept {
+                error,
+                solution: Solution { values, states },
+                predicted,
+            });
+        }
+    }
+
+    /// The free runs of a solution, row by row; none where they were not kept, or positions are measured ones.
+    pub(crate) fn runs_of(&self, solution: &Solution) -> Option<Vec<Vec<f64>>> {
+        let kept = self.kept.take().filter(|_| self.positions.is_none())?;
+        (kept.solution == *solution).then_some(kept.predicted)
     }
 
     /// Weighted residuals of one run.

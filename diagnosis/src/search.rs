@@ -311,7 +311,7 @@ mod tests {
             .solve_from(&model.values(), &states, Effort::FULL)
             .unwrap();
         let cost = problem.best().unwrap().0.powi(2);
-        let mut rank = holdout.judge(&model, &solution, &work).unwrap().rank;
+        let mut rank = holdout.judge(&model, &solution, None, &work).unwrap().rank;
         rank.iter_mut().for_each(|loss| *loss *= worse.powi(2));
         let nominal = Nominal {
             given,

@@ -52,15 +52,17 @@ impl Judged {
         nrmse(&self.rank)
     }
 
-    /// Judges the solution of a candidate's `model`; none where its free run diverges or the work was cancelled.
+    /// Judges the solution of a candidate's `model`, whose free runs may be `known`; none where they diverge or the work was
+    /// cancelled.
     pub(crate) fn of(
         candidate: Candidate,
         model: &Model,
         solution: Solution,
+        known: Option<&[Vec<f64>]>,
         nominal: &Nominal<'_>,
     ) -> Option<Self> {
-        let Judgement { losses, rank } =
-            (nominal.holdout.judge(model, &solution, nominal.work)).ok()?;
+        let judged = (nominal.holdout).judge(model, &solution, known, nominal.work);
+        let Judgement { losses, rank } = judged.ok()?;
         nrmse(&rank).is_finite().then_some(Self {
             candidate,
             solution,
@@ -121,7 +123,10 @@ impl<'a> Nominal<'a> {
     {
         let known = known.map(<[DVector<f64>]>::to_vec);
         let seen = self.holdout.seen.as_deref();
-        Problem::with(model, self.holdout.runs, seen, known, self.work.silently()).ok()
+        let work = self.work.silently();
+        let mut problem = Problem::with(model, self.holdout.runs, seen, known, work).ok()?;
+        problem.keeps = true;
+        Some(problem)
     }
 }
 
@@ -161,7 +166,14 @@ pub(crate) fn look(
     let mut problem = problem()?;
     let solution = problem.solve_from(&start, states, effort).ok()?;
     let (left, _) = problem.best()?;
-    let judged = Judged::of(candidate.clone(), &model, solution, nominal)?;
+    let known = problem.runs_of(&solution);
+    let judged = Judged::of(
+        candidate.clone(),
+        &model,
+        solution,
+        known.as_deref(),
+        nominal,
+    )?;
     Some((judged, left))
 }
 
@@ -262,6 +274,7 @@ fn fully(first: Judged, nominal: &Nominal<'_>, wild: f64, most: f64) -> Option<(
         };
         return fully(again, nominal, wild, f64::INFINITY);
     }
-    let judged = Judged::of(first.candidate.clone(), &model, solution, nominal)?;
+    let (candidate, known) = (first.candidate.clone(), problem.runs_of(&solution));
+    let judged = Judged::of(candidate, &model, solution, known.as_deref(), nominal)?;
     Some((judged, fit))
 }
