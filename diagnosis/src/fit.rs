@@ -32,15 +32,19 @@ pub fn fit(
         test: None,
         ..*measurements
     };
-    let before = match free_run_error(model, &fitted_to, &work.silently()) {
+    let (before, result) = rayon::join(
+        || free_run_error(model, &fitted_to, &work.silently()),
+        || match settings.method {
+            Method::Rls => rls::fit(model, runs, settings, work),
+            Method::OutputError => output_error::fit(model, runs, settings, work),
+        },
+    );
+    let before = match before {
         Ok(error) => Some(error),
         Err(CompareError::Cancelled(cancelled)) => return Err(cancelled.into()),
         Err(_) => None,
     };
-    let mut result = match settings.method {
-        Method::Rls => rls::fit(model, runs, settings, work)?,
-        Method::OutputError => output_error::fit(model, runs, settings, work)?,
-    };
+    let mut result = result?;
     result.nrmse_before = before;
     if result.cancelled {
         return Ok(result);

@@ -148,6 +148,8 @@ struct State {
     diagnoses: Vec<Diagnosis>,
     /// What was tried in place of the present model, fitted, with its error.
     tried: Vec<(f64, Model)>,
+    /// The present model fitted to all of the log, where that was done beside its diagnosis.
+    fitted: Option<Fit>,
 }
 
 impl State {
@@ -159,6 +161,7 @@ impl State {
             steps: Vec::new(),
             diagnoses: Vec::new(),
             tried: Vec::new(),
+            fitted: None,
         }
     }
 
@@ -182,7 +185,14 @@ impl State {
     ) -> Result<Diagnosis, FitError> {
         let round = self.diagnoses.len();
         let aim = self.aim(work);
-        let diagnosis = diagnose_for(&self.present, measurements, aim, &work.in_round(round))?;
+        let settings = FitSettings::default();
+        let last = || fit(&self.present, measurements, &settings, &work.silently());
+        let (diagnosis, fitted) = rayon::join(
+            || diagnose_for(&self.present, measurements, aim, &work.in_round(round)),
+            || self.is_complete(work.criteria()).then(last),
+        );
+        let diagnosis = diagnosis?;
+        self.fitted = fitted.and_then(Result::ok).filter(|fit| !fit.cancelled);
         if let Some(fitted) = &diagnosis.model
             && self.steps.is_empty()
         {
@@ -199,6 +209,16 @@ impl State {
         Ok(diagnosis)
     }
 
+    /// Whether the last step left hardly more than noise. Then the next diagnosis mostly finds nothing.
+    fn is_complete(&self, criteria: &Criteria) -> bool {
+        match (&self.steps[..], self.diagnoses.last()) {
+            ([_, .., last], Some(diagnosis)) => {
+                last.nrmse_test <= criteria.missing.complete * diagnosis.floor.nrmse
+            }
+            _ => false,
+        }
+    }
+
     /// Adds what the diagnosis of a `round` named.
     fn step(&mut self, best: Explanation, round: usize, work: &Work<'_>) {
         work.in_round(round).know(|| Finding::Added((&best).into()));
@@ -212,6 +232,7 @@ impl State {
             still_open: Vec::new(),
         });
         self.before = Some((std::mem::replace(&mut self.present, best.model), steps));
+        self.fitted = None;
     }
 
     /// Adds what the diagnosis of a `round` named, and corrects earlier steps where that changes them. Whether it stays.
@@ -268,7 +289,8 @@ impl State {
         } = work.criteria();
         let floor = self.diagnoses.last().map_or(0.0, |d| d.floor.nrmse);
         let mut present = loop {
-            match fit(&self.present, measurements, settings, work) {
+            let known = self.fitted.take().map(Ok);
+            match known.unwrap_or_else(|| fit(&self.present, measurements, settings, work)) {
                 Err(error) if is_divergence(&error) && self.take_back() => {}
                 done => break done?,
             }
@@ -306,6 +328,7 @@ impl State {
         let without = self.without_last(&self.present.clone());
         without.is_some_and(|(without, steps)| {
             (self.present, self.steps) = (without, steps);
+            self.fitted = None;
             true
         })
     }
