@@ -65,6 +65,7 @@
 //! well. An expression in the model file is a part of the model: it is fitted with whatever is tried beside it.
 
 mod advice;
+mod along;
 mod arrive;
 mod both_ways;
 mod candidates;
@@ -102,6 +103,7 @@ mod improve;
 mod improvement;
 mod in_motion;
 mod judge;
+mod kept;
 mod levenberg_marquardt;
 mod linearised;
 mod long;
@@ -114,6 +116,7 @@ mod observer;
 mod omitted;
 mod output_error;
 mod pairs;
+mod passage;
 mod places;
 mod plausible;
 mod positions;

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::error::FitError;
 use crate::first::first_weights;
 use crate::flatness::Named;
+use crate::kept::Kept;
 use crate::linearised::{Linearised, zeros};
 use crate::noise::Block;
 use crate::positions::Positions;
@@ -52,15 +53,7 @@ pub(crate) struct Problem<'a> {
     best: RefCell<Option<(f64, Solution)>>,
     /// Whether the free runs of the best are kept, for who judges it.
     pub(crate) keeps: bool,
-    kept: RefCell<Option<Kept>>,
-}
-
-/// The free runs of a solution.
-struct Kept {
-    /// The root of its cost.
-    error: f64,
-    solution: Solution,
-    predicted: Vec<Vec<f64>>,
+    pub(crate) kept: RefCell<Option<Kept>>,
 }
 
 impl<'a> Problem<'a> {
@@ -274,32 +267,6 @@ impl<'a> Problem<'a> {
         Ok(all)
     }
 
-    /// Keeps the free runs of the solution of least error.
-    fn keep_runs(
-        &self,
-        residual: &DVector<f64>,
-        values: &[f64],
-        states: &[DVector<f64>],
-        predicted: Vec<Vec<f64>>,
-    ) {
-        let error = residual.norm();
-        let mut kept = self.kept.borrow_mut();
-        if error.is_finite() && kept.as_ref().is_none_or(|best| error < best.error) {
-            let (values, states) = (values.to_vec(), states.to_vec());
-            *kept = Some(Kept {
-                error,
-                solution: Solution { values, states },
-                predicted,
-            });
-        }
-    }
-
-    /// The free runs of a solution, row by row; none where they were not kept, or positions are measured ones.
-    pub(crate) fn runs_of(&self, solution: &Solution) -> Option<Vec<Vec<f64>>> {
-        let kept = self.kept.take().filter(|_| self.positions.is_none())?;
-        (kept.solution == *solution).then_some(kept.predicted)
-    }
-
     /// Weighted residuals of one run.
     fn weighted(&self, run: usize, predicted: &[f64], scaled: &DVector<f64>) -> DVector<f64> {
         let mut residual = residuals(predicted, &self.runs[run]);
@@ -346,8 +313,6 @@ impl<'a> Problem<'a> {
         }
         self.forget();
         let (values, states) = self.unpack(scaled);
-        let n_free = self.free.len();
-        let n_visible = self.visible.len();
         let (rows, columns) = (self.rows(), self.scales.len());
         let mut all = DVector::zeros(rows);
         let mut jacobian = zeros(rows, columns);
@@ -360,27 +325,11 @@ impl<'a> Problem<'a> {
         let sensitivities = for_each_run(self.runs, &states, |run, x0| {
             sensitivities(positions, model, &values, x0, run, by, work)
         })?;
-        for (index, (run, s)) in self.runs.iter().zip(sensitivities).enumerate() {
+        for (index, s) in sensitivities.iter().enumerate() {
             let residual = self.weighted(index, &s.predicted, scaled);
             let rows = residual.len();
             all.rows_mut(first_row, rows).copy_from(&residual);
-            let weight = |(row, measured): (usize, &f64)| {
-                let counts = measured.is_finite();
-                if counts { self.weight(index, row) } else { 0.0 }
-            };
-            let weights: Vec<f64> = run.measured().iter().enumerate().map(weight).collect();
-            for column in 0..n_free + n_visible {
-                let to = if column < n_free {
-                    column
-                } else {
-                    column + index * n_visible
-                };
-                let mut slopes = jacobian.view_mut((first_row, to), (rows, 1));
-                let from = s.jacobian.column(column);
-                for (to_row, (slope, weight)) in slopes.iter_mut().zip(from.iter().zip(&weights)) {
-                    *to_row = -slope * weight * self.scales[to];
-                }
-            }
+            self.weigh(index, first_row, &s.jacobian, &mut jacobian);
             self.filter_jacobian(index, first_row, rows, &mut jacobian);
             first_row += rows;
         }
@@ -390,6 +339,45 @@ impl<'a> Problem<'a> {
             residual: all,
             jacobian,
         }))
+    }
+
+    /// Puts derivatives of one run, weighted, into those of all residuals from the `first_row` on. Columns: free parameters,
+    /// then initial states of that run.
+    fn weigh(
+        &self,
+        index: usize,
+        first_row: usize,
+        slopes: &DMatrix<f64>,
+        jacobian: &mut DMatrix<f64>,
+    ) {
+        let weight = |(row, measured): (usize, &f64)| {
+            let counts = measured.is_finite();
+            if counts { self.weight(index, row) } else { 0.0 }
+        };
+        let measured = self.runs[index].measured().iter().enumerate();
+        let weights: Vec<f64> = measured.map(weight).collect();
+        for (column, from) in slopes.column_iter().enumerate() {
+            let to = if column < self.free.len() {
+                column
+            } else {
+                column + index * self.visible.len()
+            };
+            let mut rows = jacobian.view_mut((first_row, to), (weights.len(), 1));
+            for (to_row, (slope, weight)) in rows.iter_mut().zip(from.iter().zip(&weights)) {
+                *to_row = -slope * weight * self.scales[to];
+            }
+        }
+    }
+
+    /// The Jacobian by derivatives of each run.
+    pub(crate) fn jacobian_of(&self, slopes: &[DMatrix<f64>]) -> DMatrix<f64> {
+        let mut jacobian = zeros(self.rows(), self.scales.len());
+        let mut first_row = 0;
+        for (index, slopes) in slopes.iter().enumerate() {
+            self.weigh(index, first_row, slopes, &mut jacobian);
+            first_row += slopes.nrows();
+        }
+        jacobian
     }
 
     /// As [`Problem::linearise`], for who changes it: it is not kept.

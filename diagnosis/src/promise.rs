@@ -26,6 +26,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::candidates::Candidate;
 use crate::gram::gram;
 use crate::linearised::Linearised;
+use crate::passage::Passage;
 use crate::positions::Positions;
 use crate::prediction::Solution;
 use crate::problem::Problem;
@@ -67,6 +68,8 @@ struct Linear {
     gram: DMatrix<f64>,
     /// `min ‖r₀ + J₀ δ‖²`
     alone: Option<f64>,
+    /// How forces pass through the model; none where each promise is simulated.
+    passage: Option<Passage>,
 }
 
 impl<'a> Promises<'a> {
@@ -168,8 +171,17 @@ impl<'a> Promises<'a> {
         let mut problem = nominal.problem(&model, nominal.held)?;
         problem.positions = at.cloned();
         let there = problem.pack(values, states);
+        // With signs as wide as those of the model.
+        let begun = problem.solution(&there);
         let there = problem.linearise_once(&there).ok()?;
-        Linear::new(at.cloned(), problem.first, there)
+        let (runs, work) = (problem.runs, &problem.work);
+        let passage = match candidate.shape() {
+            Some(_) => Passage::of(&model, &begun, at, runs, work).ok()?,
+            None => None,
+        };
+        let mut linear = Linear::new(at.cloned(), problem.first, there)?;
+        linear.passage = passage;
+        Some(linear)
     }
 }
 
@@ -184,6 +196,7 @@ impl Linear {
             jacobian: there.jacobian,
             gram,
             alone: None,
+            passage: None,
         };
         let none = DMatrix::zeros(linear.residual.len(), 0);
         linear.alone = linear.after(&linear.residual, &none);
@@ -195,7 +208,27 @@ impl Linear {
     fn at(&self, problem: &mut Problem<'_>, start: &[f64]) -> Option<Rc<Linearised>> {
         problem.first.clone_from(&self.first);
         // What is known is no unknown.
-        problem.linearise(&problem.pack(start, &[])).ok()
+        let at = problem.pack(start, &[]);
+        let (values, _) = problem.unpack(&at);
+        let passes = |passage: &Passage| {
+            let (model, runs, work) = (problem.model, problem.runs, &problem.work);
+            passage.slopes(model, &values, &problem.free, runs, work)
+        };
+        match self
+            .passage
+            .as_ref()
+            .map(passes)
+            .transpose()
+            .ok()?
+            .flatten()
+        {
+            Some(slopes) => Some(Rc::new(Linearised {
+                at,
+                residual: self.residual.clone(),
+                jacobian: problem.jacobian_of(&slopes),
+            })),
+            None => problem.linearise(&at).ok(),
+        }
     }
 
     /// Cost at the start of a candidate, and the one that a full Gauss–Newton step of all parameters would reach if the model

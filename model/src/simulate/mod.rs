@@ -9,6 +9,7 @@ mod length;
 mod lengthen;
 mod observer;
 mod plan;
+mod present;
 mod push;
 mod ramp;
 mod sensing;
