@@ -53,7 +53,7 @@ pub(crate) struct Problem<'a> {
     best: RefCell<Option<(f64, Solution)>>,
     /// Whether the free runs of the best are kept, for who judges it.
     pub(crate) keeps: bool,
-    pub(crate) kept: RefCell<Option<Kept>>,
+    kept: RefCell<Kept>,
 }
 
 impl<'a> Problem<'a> {
@@ -149,7 +149,7 @@ impl<'a> Problem<'a> {
             positions: None,
             best: RefCell::new(None),
             keeps: false,
-            kept: RefCell::new(None),
+            kept: RefCell::default(),
         })
     }
 
@@ -261,10 +261,17 @@ impl<'a> Problem<'a> {
         }
         let all = DVector::from_vec(all);
         if self.keeps {
-            self.keep_runs(&all, &values, &states, predicted);
+            let mut kept = self.kept.borrow_mut();
+            kept.keep(all.norm(), &values, &states, predicted);
         }
         self.remember(&all, values, states);
         Ok(all)
+    }
+
+    /// The free runs of a solution, row by row; none where they were not kept, or positions are measured ones.
+    pub(crate) fn runs_of(&self, solution: &Solution) -> Option<Vec<Vec<f64>>> {
+        let kept = self.kept.take();
+        kept.of(solution).filter(|_| self.positions.is_none())
     }
 
     /// Weighted residuals of one run.
