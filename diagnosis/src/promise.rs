@@ -171,14 +171,15 @@ impl<'a> Promises<'a> {
         let mut problem = nominal.problem(&model, nominal.held)?;
         problem.positions = at.cloned();
         let there = problem.pack(values, states);
-        // With signs as wide as those of the model.
-        let begun = problem.solution(&there);
-        let there = problem.linearise_once(&there).ok()?;
-        let (runs, work) = (problem.runs, &problem.work);
         let passage = match candidate.shape() {
-            Some(_) => Passage::of(&model, &begun, at, runs, work).ok()?,
+            // With signs as wide as those of the model.
+            Some(_) => {
+                let begun = problem.solution(&there);
+                Passage::of(&model, &begun, at, problem.runs, &problem.work).ok()?
+            }
             None => None,
         };
+        let there = problem.linearise_once(&there).ok()?;
         let mut linear = Linear::new(at.cloned(), problem.first, there)?;
         linear.passage = passage;
         Some(linear)
@@ -209,19 +210,17 @@ impl Linear {
         problem.first.clone_from(&self.first);
         // What is known is no unknown.
         let at = problem.pack(start, &[]);
-        let (values, _) = problem.unpack(&at);
-        let passes = |passage: &Passage| {
-            let (model, runs, work) = (problem.model, problem.runs, &problem.work);
-            passage.slopes(model, &values, &problem.free, runs, work)
+        let slopes = match &self.passage {
+            Some(passage) => {
+                let (values, _) = problem.unpack(&at);
+                let (model, runs, work) = (problem.model, problem.runs, &problem.work);
+                passage
+                    .slopes(model, &values, &problem.free, runs, work)
+                    .ok()?
+            }
+            None => None,
         };
-        match self
-            .passage
-            .as_ref()
-            .map(passes)
-            .transpose()
-            .ok()?
-            .flatten()
-        {
+        match slopes {
             Some(slopes) => Some(Rc::new(Linearised {
                 at,
                 residual: self.residual.clone(),

@@ -6,12 +6,7 @@ use super::Simulator;
 use crate::registry::HostReal;
 
 impl<S: HostReal> Simulator<'_, S> {
-    /// The plant's state, and behind it those of the effects.
-    pub fn whole_state(&self) -> &[S] {
-        &self.x[..self.model.n_states() + self.bounds.states]
-    }
-
-    /// The same, to be set.
+    /// The plant's state, and behind it those of the effects, to be set.
     pub fn whole_state_mut(&mut self) -> &mut [S] {
         self.fresh = false;
         let n = self.model.n_states() + self.bounds.states;
