@@ -161,9 +161,11 @@ fn campaign(target: &Target, number: u64, count: u64) -> Tally {
 }
 
 fn main() -> ExitCode {
-    let millions: f64 = std::env::args()
-        .nth(1)
-        .map_or(1.0, |text| text.parse().unwrap());
+    let asked = std::env::args().nth(1);
+    let Ok(millions) = asked.as_deref().unwrap_or("1").parse::<f64>() else {
+        eprintln!("usage: attack [MILLIONS OF INPUTS]");
+        return ExitCode::from(2);
+    };
     // What panics says so by being counted.
     std::panic::set_hook(Box::new(|_| {}));
     let from = Instant::now();
