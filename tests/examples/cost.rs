@@ -28,7 +28,7 @@ const USUAL_RATE: usize = 1000;
 /// How often logs of one length are sampled, Hz, and that length, s.
 const RATES: [usize; 5] = [50, 100, 200, 500, 1000];
 const USUAL_LENGTH: usize = 100;
-/// How long a voltage is held: two in a second.
+/// Voltages in a second.
 const LEVELS_PER_SECOND: usize = 2;
 /// Width of the sensor's noise, rad/s: that of 0.05 rad/s standard deviation if it is uniform.
 const NOISE: f64 = 0.173;
@@ -203,8 +203,7 @@ fn draw(panel: &Picture<'_>, title: &str, unit: &str, costs: &[(usize, Cost)]) {
         let style = ("sans-serif", 13).into_font().color(&color).pos(above);
         let named =
             |at: &(f64, f64)| EmptyElement::at(*at) + Text::new(name, (0, -8), style.clone());
-        let at_end = points.iter().rev().take(1).map(named);
-        chart.draw_series(at_end).expect("a name");
+        chart.draw_series(points.last().map(named)).expect("a name");
     }
 }
 
