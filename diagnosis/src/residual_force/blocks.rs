@@ -16,6 +16,9 @@ const SAMPLES: f64 = 40.0;
 const BLOCKS: f64 = 40.0;
 /// Every so many blocks one is left out of a fit.
 const FOLDS: usize = 4;
+/// Weight of a coefficient of zero, as a share of the weight of the samples. It decides where terms and the
+/// model's own parameters do the same.
+pub(super) const RIDGE: f64 = 1e-7;
 
 /// Sums of products by block of time.
 pub(super) struct Blocks {
@@ -25,7 +28,9 @@ pub(super) struct Blocks {
     square: Vec<f64>,
     /// Number of residuals.
     rows: f64,
-    /// Weight of staying at zero, as a share of each column's own square.
+    /// Number of the first columns that stay at zero by [`RIDGE`] alone.
+    known: usize,
+    /// Weight of staying at zero of the other columns, as a share of each column's own square.
     ridge: f64,
 }
 
@@ -49,12 +54,12 @@ fn blocks(runs: &[Run]) -> (Vec<usize>, usize) {
 }
 
 impl Blocks {
-    /// `ridge` is the weight of staying at zero, as a share of each column's own square. It keeps the coefficients
-    /// small of columns that are dependent, or zero in the fitting data.
+    /// `ridge` is the weight of staying at zero, as a share of each column's own square, of all columns beyond the first `known`. It
+    /// keeps the coefficients small of columns that are dependent, or zero in the fitting data.
     pub(super) fn new(
         responses: &Responses,
         runs: &[Run],
-        ridge: f64,
+        (known, ridge): (usize, f64),
         work: &Work<'_>,
     ) -> Result<Self, Cancelled> {
         let (block, n) = blocks(runs);
@@ -90,13 +95,9 @@ impl Blocks {
             right,
             square: parts.iter().map(square).collect(),
             rows: responses.innovations.iter().filter(|v| **v != 0.0).count() as f64,
+            known,
             ridge,
         })
-    }
-
-    /// Sum of squares of the values to explain.
-    pub(super) fn total(&self) -> f64 {
-        self.square.iter().sum()
     }
 
     /// Best coefficients of `columns` over all blocks but each `fold`-th of the folds, and the
@@ -135,7 +136,11 @@ impl Blocks {
             for j in 0..n {
                 scaled[(i, j)] *= scale[i] * scale[j];
             }
-            scaled[(i, i)] += if scale[i] > 0.0 { self.ridge } else { 1.0 };
+            scaled[(i, i)] += match columns[i] {
+                _ if scale[i] <= 0.0 => 1.0,
+                column if column < self.known => RIDGE,
+                _ => self.ridge,
+            };
         }
         let inverse = Cholesky::new(scaled)?.inverse();
         let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use loopsight_core::Role;
+use nalgebra::DVector;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -18,7 +19,7 @@ const BINS: usize = 16;
 const TAIL: f64 = 0.01;
 
 /// Weight of a mean of zero, as a share of the weight of all samples of a bin.
-const RIDGE: f64 = 1e-3;
+const RIDGE_OF_MEANS: f64 = 1e-3;
 
 /// How a force depends on one quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -29,7 +30,8 @@ pub struct ForceDependence {
     pub unit: String,
     /// One turn, where the quantity is an angle that makes turns. The angle is reduced to it.
     pub period: Option<f64>,
-    /// Share of the force's variance that its mean over the quantity accounts for, on held-out blocks of time.
+    /// Share of the force's variance that its mean over the quantity accounts for, on held-out blocks of time. What the
+    /// model's own parameters can do belongs to neither.
     pub share_of_variance: f64,
     /// The mean force over the quantity: one curve for each direction of motion, or one for all.
     pub curves: Vec<ForceCurve>,
@@ -62,8 +64,12 @@ pub struct ForceBin {
 /// The model as the filter followed it through the measurements.
 pub(super) struct Followed<'a> {
     pub(super) following: Following<'a>,
-    /// White innovations that a force should explain, and the sum of squares that noise alone would give.
-    pub(super) innovations: &'a nalgebra::DVector<f64>,
+    /// White innovations, and their derivatives by the model's own parameters.
+    pub(super) bent: &'a Responses,
+    /// White innovations at the parameters that are best beside a force.
+    pub(super) innovations: &'a DVector<f64>,
+    /// Sums of squares that the model's own parameters leave on held-out blocks, and that noise alone would leave.
+    pub(super) plain: f64,
     pub(super) noise: f64,
 }
 
@@ -131,22 +137,25 @@ fn dependence(
         }
         sorted.push(part);
     }
-    let Responses { columns: found, .. } = responses(&followed.following, &columns, work)?;
-    let blocks = Blocks::new(
-        &Responses {
-            innovations: followed.innovations.clone(),
-            columns: found,
-        },
-        followed.following.runs,
-        RIDGE,
-        work,
-    )?;
+    let forces = responses(&followed.following, &columns, work)?.columns;
+    let runs = followed.following.runs;
+    let own = followed.bent.columns.ncols();
+    let mut both = followed.bent.columns.clone();
+    both.extend(forces.column_iter());
+    let beside = Responses {
+        innovations: followed.bent.innovations.clone(),
+        columns: both,
+    };
+    let every: Vec<usize> = (0..own + columns.len()).collect();
+    let beside = Blocks::new(&beside, runs, (own, RIDGE_OF_MEANS), work)?.unseen(&every);
+    let alone = Responses {
+        innovations: followed.innovations.clone(),
+        columns: forces,
+    };
     let every: Vec<usize> = (0..columns.len()).collect();
-    let Some(means) = blocks.solve(&every) else {
+    let Some(means) = Blocks::new(&alone, runs, (0, RIDGE_OF_MEANS), work)?.solve(&every) else {
         return Ok(None);
     };
-    let left: f64 = blocks.unseen(&every).iter().sum();
-    let share = (blocks.total() - left) / (blocks.total() - followed.noise);
     let mut means = means.into_iter();
     let curves = directions
         .iter()
@@ -172,7 +181,7 @@ fn dependence(
         quantity: of.variable.name().to_owned(),
         unit: of.unit.clone(),
         period: of.turns.then_some(TAU),
-        share_of_variance: share.clamp(0.0, 1.0),
+        share_of_variance: share(followed.plain, beside.iter().sum(), followed.noise),
         curves,
     }))
 }
@@ -230,6 +239,16 @@ fn sort(
         *center /= (*count).max(1) as f64;
     }
     Some(sorted)
+}
+
+/// The share that was explained of what can be explained: `before` and `after` are sums of squares, and `noise` what it leaves.
+pub(super) fn share(before: f64, after: f64, noise: f64) -> f64 {
+    let share = (before - after) / (before - noise);
+    if share.is_finite() {
+        share.clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
 }
 
 /// The mean of `laws` over the samples of a bin.

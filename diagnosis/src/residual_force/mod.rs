@@ -25,8 +25,8 @@ use crate::error::CompareError;
 use crate::measurements::Measurements;
 use crate::prediction::{InitialStates, Solution};
 use crate::progress::{Cancelled, Work};
-use blocks::Blocks;
-use dependence::{Followed, dependences};
+use blocks::{Blocks, RIDGE};
+use dependence::{Followed, dependences, share};
 use filter::filter;
 use place::{Group, Way, groups};
 use response::{Column, Following, responses};
@@ -36,9 +36,7 @@ use words::{statement, written};
 
 /// Most samples that are used: they are enough to show what a force depends on.
 const MOST_SAMPLES: usize = 30_000;
-/// Weight of a coefficient of zero, as a share of the weight of the samples. It decides where terms and the
-/// model's own parameters do the same.
-const RIDGE: f64 = 1e-7;
+
 /// A force that would make the model agree with the measurements.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ResidualForce {
@@ -59,7 +57,8 @@ pub struct ResidualForce {
 pub struct ForceExpression {
     /// The expression with its numbers.
     pub force: String,
-    /// Share of the residual force's variance that it accounts for, on held-out blocks of time.
+    /// Share of the residual force's variance that it accounts for, on held-out blocks of time. What the model's own parameters
+    /// can do belongs to neither.
     pub share_of_variance: f64,
     /// `[[effect]]` entries for the model file.
     pub toml: String,
@@ -127,7 +126,7 @@ pub(crate) fn of_solution(
     let bent = responses(&following, &bend, work)?;
 
     let spread = noise * (2.0 / bent.innovations.len().max(1) as f64).sqrt();
-    let blocks = Blocks::new(&bent, runs, RIDGE, work)?;
+    let blocks = Blocks::new(&bent, runs, (known.len(), RIDGE), work)?;
     let plain: f64 = blocks.unseen(&known).iter().sum();
     let slow = missing && force > criteria.seen;
     if plain - noise < criteria.seen * spread && !slow {
@@ -139,7 +138,12 @@ pub(crate) fn of_solution(
     let mut best: Option<Found> = None;
     for group in groups(model, runs, &filtered) {
         let forces = responses(&following, &group.columns(), work)?;
-        let blocks = Blocks::new(&group.joined(&bent, &forces), runs, RIDGE, work)?;
+        let blocks = Blocks::new(
+            &group.joined(&bent, &forces),
+            runs,
+            (known.len(), RIDGE),
+            work,
+        )?;
         for way in group.ways.clone() {
             let choices = group.choices(way, known.len());
             let chosen = select(&blocks, &known, &choices, noise, work)?;
@@ -175,21 +179,22 @@ pub(crate) fn of_solution(
     if !numbers.is_empty() {
         innovations -= &bent.columns * DVector::from_column_slice(bending);
     }
-    let explainable = innovations.norm_squared() - noise;
     let laws = match found.chosen.terms.as_slice() {
         [] => Vec::new(),
         terms => found.group.laws(found.way, terms, numbers),
     };
     let at = found.group.at(found.way);
+    // Where forces are sought that are slower than noise, noise is no bound of what they explain.
+    let noise = noise.min(found.left);
     let followed = Followed {
         following,
+        bent: &bent,
         innovations: &innovations,
+        plain,
         noise,
     };
     let depends_on = dependences(&followed, &found.group, &at, &laws, work)?;
-    let share = (1.0 - (found.left - noise) / explainable).clamp(0.0, 1.0);
-    // A force that does not vary has no variance to account for.
-    let share = if share.is_nan() { 0.0 } else { share };
+    let share = share(plain, found.left, noise);
     let names: Vec<String> = at
         .iter()
         .map(|c| found.group.channels[*c].id.to_owned())
