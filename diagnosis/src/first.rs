@@ -53,7 +53,7 @@ fn of_run(run: &Run, signal: usize, (noise, std): (f64, f64), criteria: &StartCr
     // White noise of variance `σ²` has `6 σ²` in second differences.
     let off = (a - 2.0 * b + c).abs() / 6f64.sqrt();
     let late = (run.time().iter().zip(0..))
-        .take_while(|(t, _)| **t <= criteria.late_s)
+        .take_while(|(t, _)| **t - run.time()[0] <= criteria.late_s)
         .map(|(_, k)| (run.sample(k)[signal] - a).abs())
         .fold(0.0, f64::max);
     let weight = criteria.wrong * std / noise.max(off).max(late);
@@ -171,6 +171,9 @@ mod tests {
         // A run that is cut out of a motion.
         let moving = run((0..10).map(|k| f64::from(k) * 0.1).collect());
         assert_eq!(of(&moving, 0.001), 1.0);
+        // Wherever its clock began.
+        let ramp = (0..20).map(|k| f64::from(k) * 0.1).collect();
+        assert_eq!(of(&run(ramp).part(10..20), 0.001), 1.0);
         let mut missing = vec![1.0; 10];
         missing[0] = f64::NAN;
         assert_eq!(of(&run(missing), 0.01), 1.0);
