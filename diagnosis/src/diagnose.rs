@@ -247,12 +247,13 @@ fn conclude_from(
     let mut verdict = conclude(diagnosis, &finalists, &evidence);
     if verdict == Conclusion::UnknownEffect && aim.force {
         work.tell(Stage::ResidualForce, 0, 1);
-        let force = residual_force::of_solution(nominal.model, nominal.solution, runs, true, work)?;
-        let expression = force.as_ref().and_then(|f| f.expression.as_ref());
-        if let Some((judged, explanation)) = expression
-            .filter(|_| discovers)
-            .and_then(|expression| discovered(expression, nominal))
+        let mut force =
+            residual_force::of_solution(nominal.model, nominal.solution, runs, true, work)?;
+        let expression = force.as_mut().and_then(|f| f.expression.as_mut());
+        if let Some(expression) = expression.filter(|_| discovers)
+            && let Some((judged, explanation)) = discovered(expression, nominal)
         {
+            expression.left = Some(explanation.nrmse);
             let better = |other: &Judged| other.error() > judged.error();
             let place = finalists.iter().position(better).unwrap_or(finalists.len());
             finalists.insert(place, judged);

@@ -1,12 +1,12 @@
 //! A force that no effect of the library explains: what it looks like, and an expression to start from.
 
-use loopsight_diagnosis::{ForceBin, ForceCurve, ForceDependence, ResidualForce};
+use loopsight_diagnosis::{ForceBin, ForceCurve, ForceDependence, ForceExpression, ResidualForce};
 
 use crate::chart::{Abscissae, Chart, Role, Trace};
 use crate::html::{escape, marked, sentence, text};
 use crate::numbers::axis;
 use crate::page::section;
-use crate::words::{percent, significant};
+use crate::words::{hundredths, percent, significant};
 
 /// Quantities that are drawn.
 const DRAWN: usize = 4;
@@ -14,6 +14,18 @@ const DRAWN: usize = 4;
 const TELLING: f64 = 0.05;
 /// Digits of a drawn value.
 const DIGITS: usize = 4;
+
+/// What to do with an expression.
+fn then(expression: &ForceExpression) -> String {
+    match expression.left {
+        Some(left) => format!(
+            "Fitted, it leaves {} on data that the model was not fitted to, which is not enough to add it. To go on from it, paste \
+             this at the end of the model file and edit it:",
+            hundredths(left)
+        ),
+        None => "Paste this at the end of the model file and fit it. Then edit it to describe what the force is:".to_owned(),
+    }
+}
 
 /// The section of a page; empty where there is nothing to show.
 pub(crate) fn residual_force(force: Option<&ResidualForce>) -> String {
@@ -40,11 +52,11 @@ pub(crate) fn residual_force(force: Option<&ResidualForce>) -> String {
     body.push_str(&format!("<div class=\"grid forces\">{charts}</div>\n"));
     body.push_str(&match &force.expression {
         Some(expression) => format!(
-            "<p>The expression <code>{}</code> accounts for {} of the variance. Paste this at the end of the \
-             model file and fit it. Then edit it to describe what the force is:</p>\n\
+            "<p>The expression <code>{}</code> accounts for {} of the variance. {}</p>\n\
              <pre><code>{}</code></pre>\n",
             escape(&expression.force),
             text(&percent(expression.share_of_variance)),
+            text(&then(expression)),
             escape(expression.toml.trim_end())
         ),
         None => "<p>No expression in these quantities stands out from the noise. What is missing depends on \
@@ -113,7 +125,6 @@ fn name(curve: &ForceCurve, what: &str) -> String {
 mod tests {
     use super::*;
     use crate::fixtures::opened;
-    use loopsight_diagnosis::ForceExpression;
 
     fn force() -> ResidualForce {
         let curve = |direction, sign: f64| ForceCurve {
@@ -145,6 +156,7 @@ mod tests {
                 share_of_variance: 0.98,
                 toml: "[[effect]]\n[effect.expression]\nat = [\"shaft\"]\n".into(),
                 beside: Vec::new(),
+                left: None,
             }),
         }
     }

@@ -65,6 +65,9 @@ pub struct ForceExpression {
     /// The model's own parameters beside it, where its law is linear: a fit with it may begin there.
     #[serde(skip)]
     pub beside: Vec<f64>,
+    /// Free-run error on the validation data with it, where a fit was made with it. It was not enough to add it.
+    #[serde(skip)]
+    pub left: Option<f64>,
 }
 
 /// What force is missing from the fitted `model`.
@@ -206,6 +209,7 @@ pub(crate) fn of_solution(
             share_of_variance: share,
             toml,
             beside: bent_by(model, solution, &parameters, bending),
+            left: None,
         }
     });
     Ok(Some(ResidualForce {

@@ -2,6 +2,8 @@
 
 use loopsight_diagnosis::ResidualForce;
 
+use super::number::hundredths;
+
 /// What is known of the force, and an expression to begin with, for a terminal; each line with a line's end
 /// before it.
 pub(crate) fn text(force: Option<&ResidualForce>) -> String {
@@ -10,10 +12,45 @@ pub(crate) fn text(force: Option<&ResidualForce>) -> String {
     };
     let mut text = format!("\nresidual force: {}", force.statement);
     if let Some(expression) = &force.expression {
+        let then = match expression.left {
+            Some(left) => format!(
+                "fitted, it leaves {} on data that the model was not fitted to, which is not enough to add it",
+                hundredths(left)
+            ),
+            None => "then fit and edit it; `improve --discover` does so".to_owned(),
+        };
         text.push_str(&format!(
-            "\n\na first expression, for the end of the model file (then fit and edit it; `improve --discover` does so):\n\n{}",
+            "\n\na first expression, for the end of the model file ({then}):\n\n{}",
             expression.toml.trim_end()
         ));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use loopsight_diagnosis::ForceExpression;
+
+    use super::*;
+
+    /// What was fitted already is not recommended.
+    #[test]
+    fn an_expression_that_was_fitted_is_no_first_one() {
+        let force = |left| ResidualForce {
+            at: vec!["shaft".into()],
+            unit: "V".into(),
+            statement: "the residual force at shaft depends on no single quantity".into(),
+            depends_on: Vec::new(),
+            expression: Some(ForceExpression {
+                force: "0.25 * flow".into(),
+                share_of_variance: 0.4,
+                toml: "[[effect]]".into(),
+                beside: Vec::new(),
+                left,
+            }),
+        };
+        let said = |left| text(Some(&force(left)));
+        assert!(said(None).contains("(then fit and edit it; `improve --discover` does so)"));
+        assert!(said(Some(0.0371)).contains("(fitted, it leaves 3.71 % on data"));
+    }
 }
