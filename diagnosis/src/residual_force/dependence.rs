@@ -30,8 +30,8 @@ pub struct ForceDependence {
     pub unit: String,
     /// One turn, where the quantity is an angle that makes turns. The angle is reduced to it.
     pub period: Option<f64>,
-    /// Share of the force's variance that its mean over the quantity accounts for, on held-out blocks of time. What the
-    /// model's own parameters can do belongs to neither.
+    /// Share of the force's variance that its mean over the quantity accounts for, on held-out blocks of time: of the whole
+    /// force, or of what the model's own parameters cannot do, whichever is less.
     pub share_of_variance: f64,
     /// The mean force over the quantity: one curve for each direction of motion, or one for all.
     pub curves: Vec<ForceCurve>,
@@ -71,6 +71,25 @@ pub(super) struct Followed<'a> {
     /// Sums of squares that the model's own parameters leave on held-out blocks, and that noise alone would leave.
     pub(super) plain: f64,
     pub(super) noise: f64,
+}
+
+impl Followed<'_> {
+    /// The share of a force's variance that was explained where these sums of squares are `left`: of the whole force, and of that
+    /// which is beyond the model's own parameters. The smaller one counts. The whole force says little where a parameter can
+    /// do nearly what the force does: both may then be large, and what moves one moves the other. What is beyond the parameters
+    /// says little of the shape of the rest.
+    pub(super) fn share(&self, left: [f64; 2]) -> f64 {
+        let whole = self.innovations.norm_squared();
+        let shares = [(whole, left[0]), (self.plain, left[1])]
+            .map(|(before, after)| (before - after) / (before - self.noise));
+        // A force that does not vary has no variance to account for.
+        let share = shares[0].min(shares[1]);
+        if share.is_finite() {
+            share.clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
+    }
 }
 
 /// Samples of some channels, by bin.
@@ -148,14 +167,16 @@ fn dependence(
     };
     let every: Vec<usize> = (0..own + columns.len()).collect();
     let beside = Blocks::new(&beside, runs, (own, RIDGE_OF_MEANS), work)?.unseen(&every);
-    let alone = Responses {
+    let whole = Responses {
         innovations: followed.innovations.clone(),
         columns: forces,
     };
     let every: Vec<usize> = (0..columns.len()).collect();
-    let Some(means) = Blocks::new(&alone, runs, (0, RIDGE_OF_MEANS), work)?.solve(&every) else {
+    let whole = Blocks::new(&whole, runs, (0, RIDGE_OF_MEANS), work)?;
+    let Some(means) = whole.solve(&every) else {
         return Ok(None);
     };
+    let left = [whole.unseen(&every), beside].map(|left| left.iter().sum());
     let mut means = means.into_iter();
     let curves = directions
         .iter()
@@ -181,7 +202,7 @@ fn dependence(
         quantity: of.variable.name().to_owned(),
         unit: of.unit.clone(),
         period: of.turns.then_some(TAU),
-        share_of_variance: share(followed.plain, beside.iter().sum(), followed.noise),
+        share_of_variance: followed.share(left),
         curves,
     }))
 }
@@ -239,16 +260,6 @@ fn sort(
         *center /= (*count).max(1) as f64;
     }
     Some(sorted)
-}
-
-/// The share that was explained of what can be explained: `before` and `after` are sums of squares, and `noise` what it leaves.
-pub(super) fn share(before: f64, after: f64, noise: f64) -> f64 {
-    let share = (before - after) / (before - noise);
-    if share.is_finite() {
-        share.clamp(0.0, 1.0)
-    } else {
-        0.0
-    }
 }
 
 /// The mean of `laws` over the samples of a bin.

@@ -26,7 +26,7 @@ use crate::measurements::Measurements;
 use crate::prediction::{InitialStates, Solution};
 use crate::progress::{Cancelled, Work};
 use blocks::{Blocks, RIDGE};
-use dependence::{Followed, dependences, share};
+use dependence::{Followed, dependences};
 use filter::filter;
 use place::{Group, Way, groups};
 use response::{Column, Following, responses};
@@ -57,8 +57,8 @@ pub struct ResidualForce {
 pub struct ForceExpression {
     /// The expression with its numbers.
     pub force: String,
-    /// Share of the residual force's variance that it accounts for, on held-out blocks of time. What the model's own parameters
-    /// can do belongs to neither.
+    /// Share of the residual force's variance that it accounts for, on held-out blocks of time: of the whole force, or of what
+    /// the model's own parameters cannot do, whichever is less.
     pub share_of_variance: f64,
     /// `[[effect]]` entries for the model file.
     pub toml: String,
@@ -132,7 +132,8 @@ pub(crate) fn of_solution(
     let blocks = Blocks::new(&bent, runs, (known.len(), RIDGE), work)?;
     let plain: f64 = blocks.unseen(&known).iter().sum();
     let slow = missing && force > criteria.seen;
-    if plain - noise < criteria.seen * spread && !slow {
+    let seen = plain - noise >= criteria.seen * spread;
+    if !seen && !slow {
         return Ok(None);
     }
 
@@ -187,8 +188,8 @@ pub(crate) fn of_solution(
         terms => found.group.laws(found.way, terms, numbers),
     };
     let at = found.group.at(found.way);
-    // Where forces are sought that are slower than noise, noise is no bound of what they explain.
-    let noise = noise.min(found.left);
+    // A force that is slower than noise explains more than is beyond noise.
+    let noise = if seen { noise } else { noise.min(found.left) };
     let followed = Followed {
         following,
         bent: &bent,
@@ -197,7 +198,7 @@ pub(crate) fn of_solution(
         noise,
     };
     let depends_on = dependences(&followed, &found.group, &at, &laws, work)?;
-    let share = share(plain, found.left, noise);
+    let share = followed.share([found.left; 2]);
     let names: Vec<String> = at
         .iter()
         .map(|c| found.group.channels[*c].id.to_owned())

@@ -28,8 +28,8 @@ pub struct MissingForce {
 pub struct WrittenForce {
     /// The expression with its numbers.
     pub force: String,
-    /// Share of the force's variance that it accounts for, on held-out blocks of time. What the model's own parameters can do
-    /// belongs to neither.
+    /// Share of the force's variance that it accounts for, on held-out blocks of time: of the whole force, or of what the
+    /// model's own parameters cannot do, whichever is less.
     pub share_of_variance: f64,
     /// `[[effect]]` entries for the model file.
     pub toml: String,
@@ -46,8 +46,8 @@ pub struct ForceDependence {
     pub unit: String,
     /// One turn, where the quantity is an angle that makes turns. The angle is reduced to it.
     pub period: Option<f64>,
-    /// Share of the force's variance that its mean over the quantity accounts for, on held-out blocks of time. What the
-    /// model's own parameters can do belongs to neither.
+    /// Share of the force's variance that its mean over the quantity accounts for, on held-out blocks of time: of the whole
+    /// force, or of what the model's own parameters cannot do, whichever is less.
     pub share_of_variance: f64,
     /// The mean force over the quantity: one curve for each direction of motion, or one for all.
     pub curves: Vec<ForceCurve>,

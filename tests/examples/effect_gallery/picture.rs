@@ -46,13 +46,15 @@ pub(crate) fn picture(effect: Hidden) -> Option<Picture> {
         .candidates
         .iter()
         .find(|c| c.place.effect == effect.id());
-    let best = itself.or(found.candidates.first())?;
-    let after = compare(&best.model, &seen, &Work::quiet()).ok()?;
+    // Nothing is tried where the plain model leaves hardly more than noise.
+    let best = itself.or(found.candidates.first());
+    let with = best.map_or(plain, |best| &best.model);
+    let after = compare(with, &seen, &Work::quiet()).ok()?;
 
     let signal = furthest_off(&before)?;
     let stretch = stretch(&before.runs[0], &after.runs[0], signal);
     // A plain model that takes the effect up is right before the fit.
-    let beside = found.missing.as_ref().map_or(&model, |_| &best.model);
+    let beside = found.missing.as_ref().map_or(&model, |_| with);
     let right = with_right_values(plain, beside);
     let off = compare(&right, &seen, &Work::quiet()).ok()?;
     let force = residual_force(&right, &runs, &Work::quiet()).ok()?;
@@ -74,7 +76,7 @@ pub(crate) fn picture(effect: Hidden) -> Option<Picture> {
 fn caption(
     log: &Recording,
     found: &Diagnosis,
-    best: &Explanation,
+    best: Option<&Explanation>,
     [before, after]: [&Comparison; 2],
     over: &MeanOver,
     share: f64,
@@ -82,12 +84,9 @@ fn caption(
     let percent = |share: f64| format!("{:.*} %", usize::from(share < 0.1), 100.0 * share);
     let left = percent(before.nrmse);
     let floor = percent(log.floor());
-    let fitted = if found.missing.is_none() {
-        format!(
-            "The plain model, fitted to this recording, leaves {left} of the signals' deviation, and the resolution of the \
-             sensors {floor}: its own parameters take the effect up, and only another measurement would show it."
-        )
-    } else {
+    let fitted = if let Some(best) = best
+        && found.missing.is_some()
+    {
         let name = |place: &EffectAt| format!("`{}` at {}", place.effect, place.at.join(" and "));
         let first = &found.candidates[0].place;
         let as_well = if *first == best.place {
@@ -100,6 +99,11 @@ fn caption(
              resolution of the sensors leaves {floor}.{as_well}",
             name(&best.place),
             percent(after.nrmse),
+        )
+    } else {
+        format!(
+            "The plain model, fitted to this recording, leaves {left} of the signals' deviation, and the resolution of the \
+             sensors {floor}: its own parameters take the effect up, and only another measurement would show it."
         )
     };
     format!(
