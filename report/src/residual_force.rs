@@ -6,7 +6,7 @@ use crate::chart::{Abscissae, Chart, Role, Trace};
 use crate::html::{escape, marked, sentence, text};
 use crate::numbers::axis;
 use crate::page::section;
-use crate::words::{hundredths, percent, significant};
+use crate::words::{fitted, percent, significant};
 
 /// Quantities that are drawn.
 const DRAWN: usize = 4;
@@ -17,11 +17,10 @@ const DIGITS: usize = 4;
 
 /// What to do with an expression.
 fn then(expression: &ForceExpression) -> String {
-    match expression.left {
-        Some(left) => format!(
-            "Fitted, it leaves {} on data that the model was not fitted to, which is not enough to add it. To go on from it, paste \
-             this at the end of the model file and edit it:",
-            hundredths(left)
+    match fitted(expression) {
+        Some(fitted) => format!(
+            "{} To go on from it, paste this at the end of the model file and edit it:",
+            sentence(&fitted)
         ),
         None => "Paste this at the end of the model file and fit it. Then edit it to describe what the force is:".to_owned(),
     }

@@ -1,8 +1,16 @@
 //! A force that no effect of the library is.
 
-use loopsight_diagnosis::ResidualForce;
+use loopsight_diagnosis::{ForceExpression, ResidualForce};
 
 use super::number::hundredths;
+
+/// What an expression left that was fitted and not added; none where it was not fitted.
+pub(crate) fn fitted(expression: &ForceExpression) -> Option<String> {
+    let left = hundredths(expression.left?);
+    Some(format!(
+        "fitted, it leaves {left} on data that the model was not fitted to, which is not enough to add it"
+    ))
+}
 
 /// What is known of the force, and an expression to begin with, for a terminal; each line with a line's end
 /// before it.
@@ -12,13 +20,8 @@ pub(crate) fn text(force: Option<&ResidualForce>) -> String {
     };
     let mut text = format!("\nresidual force: {}", force.statement);
     if let Some(expression) = &force.expression {
-        let then = match expression.left {
-            Some(left) => format!(
-                "fitted, it leaves {} on data that the model was not fitted to, which is not enough to add it",
-                hundredths(left)
-            ),
-            None => "then fit and edit it; `improve --discover` does so".to_owned(),
-        };
+        let then = fitted(expression)
+            .unwrap_or_else(|| "then fit and edit it; `improve --discover` does so".to_owned());
         text.push_str(&format!(
             "\n\na first expression, for the end of the model file ({then}):\n\n{}",
             expression.toml.trim_end()
@@ -29,8 +32,6 @@ pub(crate) fn text(force: Option<&ResidualForce>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use loopsight_diagnosis::ForceExpression;
-
     use super::*;
 
     /// What was fitted already is not recommended.

@@ -69,6 +69,7 @@ mod table;
 pub use advice::{AdvisedRecording, recordings};
 pub use diagnosis::Said;
 pub use faults::{fault, faults, severity};
+pub(crate) use force::fitted;
 pub use number::{ASTRAY, error, hundredths, number, percent, quantity, rounded, with_error};
 pub(crate) use number::{exponent, significant};
 pub use place::{enumerated, place, place_in_table, place_to_type, what_it_is};
