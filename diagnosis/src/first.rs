@@ -12,7 +12,8 @@ use crate::problem::Problem;
 use crate::progress::Cancelled;
 use crate::window::lags;
 
-/// How many times as much the first sample of each run counts as any other, by run and signal.
+/// How many times as much the first samples of each run count as any other: by run, one after the other, by signal. It is
+/// the first sample alone, or those in which the machine rests.
 ///
 /// The first sample differs from the model only by the noise `σ` of its sensor; later samples differ by the
 /// error of the model as well. With `std` the signal's standard deviation and `e` the share of it that a model
@@ -30,21 +31,70 @@ use crate::window::lags;
 /// * how far the signal moves while a measurement may be late: a late sensor does not tell the state at the
 ///   first instant of a run that was cut out of a motion.
 ///
+/// Where the machine rests at the start ([`at_rest`]), how late a measurement is does not matter, and all samples of the rest
+/// count so: a position that stays says that the speed is zero, too. With one that is free, a pendulum begins at some
+/// speed to make up for a fan that answers late, and a drive that rests begins to move before it is driven.
+///
 /// (The prior of a start is that of a Kalman filter, L. Ljung, 1999, "System Identification", 2nd edition,
 /// section 4.3.)
 pub(crate) fn first_weights(model: &Model, runs: &[Run], criteria: &Criteria) -> Vec<Vec<f64>> {
     let known: Vec<(f64, f64)> = (model.measured.iter().enumerate())
         .map(|(i, m)| noise(&m.sensor, i, &Part::all(runs), &criteria.log))
         .collect();
+    let idle = idle(runs, criteria.start.idle);
     runs.iter()
         .map(|run| {
-            let weight = |(i, known): (usize, &(f64, f64))| of_run(run, i, *known, &criteria.start);
-            known.iter().enumerate().map(weight).collect()
+            let rest = at_rest(run, &known, &idle, &criteria.start);
+            let weight = |(i, known): (usize, &(f64, f64))| {
+                of_run(run, i, *known, rest > 0, &criteria.start)
+            };
+            let weights: Vec<f64> = known.iter().enumerate().map(weight).collect();
+            weights.repeat(rest.max(1))
         })
         .collect()
 }
 
-fn of_run(run: &Run, signal: usize, (noise, std): (f64, f64), criteria: &StartCriteria) -> f64 {
+/// The input below which none acts, by input.
+fn idle(runs: &[Run], share: f64) -> Vec<f64> {
+    let n_inputs = runs.first().map_or(0, Run::n_inputs);
+    let of = |i: usize| {
+        let all = runs.iter().flat_map(|run| run.inputs().chunks(n_inputs));
+        share * all.map(|u| u[i].abs()).fold(0.0, f64::max)
+    };
+    (0..n_inputs).map(of).collect()
+}
+
+/// Samples at the start of a run in which the machine is known to rest; none where it is not known to. It rests where no signal
+/// moves by more than its noise until an input acts, and not before a motion that went before would have shown either.
+fn at_rest(run: &Run, known: &[(f64, f64)], idle: &[f64], criteria: &StartCriteria) -> usize {
+    let soon = |k: &usize| run.time()[*k] - run.time()[0] <= criteria.rest_s;
+    let acts = |k: &usize| {
+        run.input(*k)
+            .iter()
+            .zip(idle)
+            .any(|(u, idle)| u.abs() > *idle)
+    };
+    let first = (0..run.len()).find(acts).unwrap_or(run.len());
+    let moves = |k: usize| {
+        let mut signals = run.sample(k).iter().zip(run.sample(0)).zip(known);
+        signals.any(|((now, before), (noise, _))| (now - before).abs() > criteria.still * noise)
+    };
+    if (0..run.len())
+        .take_while(|k| *k < first || soon(k))
+        .any(moves)
+    {
+        return 0;
+    }
+    (0..first).take_while(soon).count()
+}
+
+fn of_run(
+    run: &Run,
+    signal: usize,
+    (noise, std): (f64, f64),
+    rests: bool,
+    criteria: &StartCriteria,
+) -> f64 {
     // An observer corrects the start.
     if run.len() < 3 || run.observer().is_some() {
         return 1.0;
@@ -53,6 +103,7 @@ fn of_run(run: &Run, signal: usize, (noise, std): (f64, f64), criteria: &StartCr
     // White noise of variance `σ²` has `6 σ²` in second differences.
     let off = (a - 2.0 * b + c).abs() / 6f64.sqrt();
     let late = (run.time().iter().zip(0..))
+        .take_while(|_| !rests)
         .take_while(|(t, _)| **t - run.time()[0] <= criteria.late_s)
         .map(|(_, k)| (run.sample(k)[signal] - a).abs())
         .fold(0.0, f64::max);
@@ -161,7 +212,7 @@ mod tests {
     fn a_start_counts_as_much_as_its_sensor_is_good() {
         let criteria = &StartCriteria::DEFAULT;
         let smooth = run(vec![1.0; 10]);
-        let of = |run: &Run, noise| of_run(run, 0, (noise, 1.0), criteria);
+        let of = |run: &Run, noise| of_run(run, 0, (noise, 1.0), false, criteria);
         assert!((of(&smooth, 0.01) - 10.0).abs() < 1e-9);
         // No better than the model, and no better than can be computed with.
         assert_eq!((of(&smooth, 0.5), of(&smooth, 0.0)), (1.0, criteria.most));
@@ -177,5 +228,36 @@ mod tests {
         let mut missing = vec![1.0; 10];
         missing[0] = f64::NAN;
         assert_eq!(of(&run(missing), 0.01), 1.0);
+    }
+
+    /// A position at 100 Hz that begins to move at sample `moves`, with an input from sample `acts` on.
+    fn driven(acts: usize, moves: usize) -> Run {
+        let of = |from: usize, k: usize, value: f64| if k < from { 0.0 } else { value };
+        let time = (0..40).map(|k| 0.01 * f64::from(k)).collect();
+        let input = (0..40).map(|k| of(acts, k, 5.0)).collect();
+        let measured = (0..40).map(|k| of(moves, k, 0.1 * k as f64)).collect();
+        Run::new("", time, Rows::new(1, input), Rows::new(1, measured)).unwrap()
+    }
+
+    #[test]
+    fn a_machine_rests_until_it_is_driven() {
+        let criteria = &StartCriteria::DEFAULT;
+        let rest = |acts, moves| {
+            let runs = [driven(acts, moves)];
+            at_rest(
+                &runs[0],
+                &[(0.001, 1.0)],
+                &idle(&runs, criteria.idle),
+                criteria,
+            )
+        };
+        // The samples until an input acts, and no more than are soon after the start.
+        assert_eq!((rest(1, 9), rest(4, 9), rest(20, 25)), (1, 4, 6));
+        // It is driven from the first sample on, moves before it is driven, or moves soon enough to have moved before.
+        assert_eq!((rest(0, 9), rest(20, 10), rest(1, 3)), (0, 0, 0));
+        // How late a sensor may be does not matter at rest.
+        let run = driven(4, 9);
+        let of = |rests| of_run(&run, 0, (0.001, 1.0), rests, criteria);
+        assert_eq!((of(true), of(false)), (criteria.most, 1.0));
     }
 }

@@ -41,7 +41,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) evaluations: Cell<u64>,
     cache: RefCell<Option<Rc<Linearised>>>,
     pub(crate) samples: f64,
-    /// How many times as much the first sample of a run counts, by run and signal.
+    /// How many times as much the first samples of a run count, by run, sample and signal, see [`first_weights`].
     pub(crate) first: Vec<Vec<f64>>,
     /// Samples that the fit may see, by run; all where there is none.
     seen: Option<&'a [Vec<bool>]>,
@@ -236,18 +236,19 @@ impl<'a> Problem<'a> {
         let weight = self.weights[row % n_signals];
         match self.first.get(run) {
             // The second pass weighs by the noise alone.
-            Some(first) if row < n_signals && self.rounding.is_empty() => weight * first[row],
+            Some(first) if row < first.len() && self.rounding.is_empty() => weight * first[row],
             _ => weight,
         }
     }
 
-    /// Rows of the first samples, which count more than others.
+    /// Rows of the first samples, which count more than others: one sample of a run, or all in which the machine rests.
     pub(crate) fn first_rows(&self) -> impl Iterator<Item = usize> + '_ {
         let n_signals = self.weights.len();
-        let starts = self.runs.iter().scan(0, move |row, run| {
+        let starts = (self.runs.iter().enumerate()).scan(0, move |row, (index, run)| {
             let first = *row;
             *row += run.len() * n_signals;
-            Some(first..(first + n_signals).min(*row))
+            let count = self.first.get(index).map_or(n_signals, Vec::len);
+            Some(first..(first + count).min(*row))
         });
         starts.flatten()
     }

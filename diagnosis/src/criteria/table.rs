@@ -39,6 +39,12 @@ criteria! {
         most: f64 = 100.0 "1", Judgement: "beyond it the start is as good as given";
         /// How late a measurement may be. A start is known no better than the signal moves in that time.
         late_s: f64 = 0.15 "s", Judgement: "the latest measurement seen on a real machine was 0.135 s late";
+        /// Share of the largest value of an input below which it does not act.
+        idle: f64 = 0.01 "1", Judgement: "a ramp from zero is at one per cent before dry friction lets go";
+        /// How far a signal at rest may be from its first sample.
+        still: f64 = 6.0 "standard deviations", Derived: "the difference of two samples is beyond it once in 45 000 by chance, and a start has some tens";
+        /// How long a machine that rests has not moved, also if an input acts before.
+        rest_s: f64 = 0.05 "s", Judgement: "several samples of a controller; one that moved before changes its speed by more than noise in that time";
         /// Error of a fit above which other starts are tried as well.
         poor: f64 = 0.1 "1", Judgement: "a fit that leaves less has converged, whatever is missing";
         /// Error above which scattered starts are tried too.
