@@ -115,25 +115,32 @@ impl Evidence<'_> {
         let criteria = self.missing();
         let unseen = advantage(self.unseen, &judged.losses, &self.criteria().window);
         let better = unseen > criteria.beats
-            || (unseen > 0.0 && explanation.significance > criteria.certain)
+            || (unseen > 0.0
+                && explanation.significance > criteria.certain
+                && !self.reshapes(judged))
             || self.shown_by_starts(judged, explanation);
         better
             && determined(&judged.candidate, explanation, criteria.undetermined)
             && explanation.implausible.is_none()
     }
 
+    /// Whether the effect depends on what went before, in a model where something is late already. In the few steps of a log
+    /// it would only give what is late another shape, and has room for whatever else is missing; so where it acts alike
+    /// in the rest of the log, steps are no evidence.
+    fn reshapes(&self, judged: &Judged) -> bool {
+        let effects = self.nominal.model.effects.iter();
+        is_dynamic(judged.candidate.meta) && effects.map(|e| e.meta).any(is_late)
+    }
+
     /// Whether the starts of the runs show the effect. They are not validation data, because the initial state
     /// is estimated from them. But they often have the only steps, so an effect that acts there need not improve
     /// the validation error. It must not make it worse, and that error must be more than noise.
     ///
-    /// One effect may be named by the starts alone for what is late there. A second one only gives the same few steps
-    /// another shape, and would have room for whatever else is missing.
+    /// One effect may be named by the starts alone for what is late there, and no second one, see [`Self::reshapes`].
     fn shown_by_starts(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
         let explained = explained(self.nominal_fit, explanation.nrmse_fit);
-        let effects = self.nominal.model.effects.iter();
-        let again = is_late(judged.candidate.meta) && effects.map(|e| e.meta).any(is_late);
-        !again
+        !self.reshapes(judged)
             && self.nominal.holdout.test.is_none()
             && self.above_floor(self.error())
             && nrmse(&judged.losses) <= criteria.no_worse * self.error()
@@ -182,7 +189,12 @@ pub(crate) fn explained(error: f64, left: f64) -> f64 {
 /// Whether an effect makes an input or a sensor answer later, or over some time.
 fn is_late(meta: &EffectMeta) -> bool {
     let between = |place: &PlaceKind| matches!(place, PlaceKind::Input | PlaceKind::Output);
-    (meta.memory || meta.states > 0) && meta.places.iter().all(between)
+    is_dynamic(meta) && meta.places.iter().all(between)
+}
+
+/// Whether what an effect does now depends on what went before.
+fn is_dynamic(meta: &EffectMeta) -> bool {
+    meta.memory || meta.states > 0
 }
 
 /// Whether the log determines how strong the effect is. An effect that cannot be told from the plant's own
