@@ -120,8 +120,9 @@ fn worth_adding(
     };
     let (before, floor) = (diagnosis.nominal.nrmse, diagnosis.floor.nrmse);
     let fell_to = best.nrmse / before;
-    // At the floor a further effect explains noise, or how the model is computed.
-    let complete = round > 0 && before < missing.complete * floor;
+    // At the floor a further effect explains noise, or how the model is computed. What is late shows in the steps, which are
+    // mostly in what was fitted.
+    let complete = round > 0 && before.max(diagnosis.nominal_fit) < missing.complete * floor;
     if complete && fell_to >= improve.better {
         return Err(Conclusion::NothingMissing);
     }
