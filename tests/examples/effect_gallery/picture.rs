@@ -14,8 +14,9 @@ use loopsight_report::{FigurePanel, FigureTrace, MeanAt, MeanOver, Style, sympto
 const SEED: u64 = 1;
 /// Samples of a stretch that is drawn: four seconds at 100 Hz.
 const STRETCH: usize = 400;
-/// A quantity that accounts for less of the missing force says nothing.
-const TELLING: f64 = 0.2;
+/// A quantity is drawn with the missing force where it accounts for more of that than this share of what another one accounts
+/// for of the residual.
+const TELLING: f64 = 0.5;
 /// Means over a quantity.
 const BINS: usize = 16;
 
@@ -63,7 +64,9 @@ pub(crate) fn picture(effect: Hidden) -> Option<Picture> {
     let over = force
         .as_ref()
         .and_then(|f| of_force(f, meta.shows == Shows::OneRun));
-    let over = over.filter(|_| meta.places[0] != PlaceKind::Output);
+    let over = over
+        .filter(|(_, told)| *told > TELLING * residual.1)
+        .filter(|_| meta.places[0] != PlaceKind::Output);
     let (over, share) = over.unwrap_or(residual);
     let title = format!("{}: {}", robot.name(), log.truth.hidden.first()?.doc);
     let caption = caption(&log, &found, best, [&before, &after], &over, share);
@@ -175,12 +178,12 @@ fn stretch(before: &RunTrace, after: &RunTrace, signal: usize) -> FigurePanel {
     }
 }
 
-/// The force over the quantity that tells most of it, and the share it tells; none where nothing tells. Time is one where
+/// The force over the quantity that tells most of it, and the share it tells; none where there is no curve. Time is one where
 /// the effect `drifts`: what depends on the position looks as if it depended on time, too.
 fn of_force(force: &ResidualForce, drifts: bool) -> Option<(MeanOver, f64)> {
     let mut quantities = force.depends_on.iter();
     let most: &ForceDependence = quantities.find(|d| drifts || d.quantity != "time")?;
-    (most.share_of_variance > TELLING && !most.curves.is_empty()).then(|| {
+    (!most.curves.is_empty()).then(|| {
         let curves = most.curves.iter().map(|curve| {
             let points = curve.bins.iter().map(|bin| MeanAt {
                 at: bin.center,
