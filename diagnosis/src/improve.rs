@@ -121,8 +121,10 @@ fn worth_adding(
     let (before, floor) = (diagnosis.nominal.nrmse, diagnosis.floor.nrmse);
     let fell_to = best.nrmse / before;
     // At the floor a further effect explains noise, or how the model is computed. What is late shows in the steps, which are
-    // mostly in what was fitted.
-    let complete = round > 0 && before.max(diagnosis.nominal_fit) < missing.complete * floor;
+    // mostly in what was fitted: where much more than noise is left there, the model is not at the floor.
+    let complete = round > 0
+        && before < missing.complete * floor
+        && diagnosis.nominal_fit <= missing.above_floor * floor;
     if complete && fell_to >= improve.better {
         return Err(Conclusion::NothingMissing);
     }
