@@ -110,6 +110,11 @@ impl EffectMeta {
         ahead_s: 0.0,
         max_step_s: f64::INFINITY,
     };
+
+    /// Whether what the effect does now depends on what went before: it has states, or looks back in time.
+    pub const fn is_dynamic(&self) -> bool {
+        self.memory || self.states > 0
+    }
 }
 
 /// What an effect sees at one of its channels at one instant.

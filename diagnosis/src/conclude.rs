@@ -129,7 +129,7 @@ impl Evidence<'_> {
     /// in the rest of the log, steps are no evidence.
     fn reshapes(&self, judged: &Judged) -> bool {
         let effects = self.nominal.model.effects.iter();
-        is_dynamic(judged.candidate.meta) && effects.map(|e| e.meta).any(is_late)
+        judged.candidate.meta.is_dynamic() && effects.map(|e| e.meta).any(is_late)
     }
 
     /// Whether the starts of the runs show the effect. They are not validation data, because the initial state
@@ -189,12 +189,7 @@ pub(crate) fn explained(error: f64, left: f64) -> f64 {
 /// Whether an effect makes an input or a sensor answer later, or over some time.
 fn is_late(meta: &EffectMeta) -> bool {
     let between = |place: &PlaceKind| matches!(place, PlaceKind::Input | PlaceKind::Output);
-    is_dynamic(meta) && meta.places.iter().all(between)
-}
-
-/// Whether what an effect does now depends on what went before.
-fn is_dynamic(meta: &EffectMeta) -> bool {
-    meta.memory || meta.states > 0
+    meta.is_dynamic() && meta.places.iter().all(between)
 }
 
 /// Whether the log determines how strong the effect is. An effect that cannot be told from the plant's own

@@ -4,6 +4,7 @@ use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use nalgebra::DVector;
 
+use crate::commands::largest_inputs;
 use crate::criteria::{Criteria, StartCriteria};
 use crate::floor::{Part, noise};
 use crate::gram::gram;
@@ -41,38 +42,27 @@ pub(crate) fn first_weights(model: &Model, runs: &[Run], criteria: &Criteria) ->
     let known: Vec<(f64, f64)> = (model.measured.iter().enumerate())
         .map(|(i, m)| noise(&m.sensor, i, &Part::all(runs), &criteria.log))
         .collect();
-    let idle = idle(runs, criteria.start.idle);
+    let largest = largest_inputs(model, runs);
     runs.iter()
         .map(|run| {
-            let rest = at_rest(run, &known, &idle, &criteria.start);
-            let weight = |(i, known): (usize, &(f64, f64))| {
-                of_run(run, i, *known, rest > 0, &criteria.start)
-            };
+            let rest = at_rest(run, &known, &largest, &criteria.start);
+            // At rest it does not matter how late a measurement is.
+            let late_s = if rest > 0 { 0.0 } else { criteria.start.late_s };
+            let weight =
+                |(i, known): (usize, &(f64, f64))| of_run(run, i, *known, late_s, &criteria.start);
             let weights: Vec<f64> = known.iter().enumerate().map(weight).collect();
             weights.repeat(rest.max(1))
         })
         .collect()
 }
 
-/// The input below which none acts, by input.
-fn idle(runs: &[Run], share: f64) -> Vec<f64> {
-    let n_inputs = runs.first().map_or(0, Run::n_inputs);
-    let of = |i: usize| {
-        let all = runs.iter().flat_map(|run| run.inputs().chunks(n_inputs));
-        share * all.map(|u| u[i].abs()).fold(0.0, f64::max)
-    };
-    (0..n_inputs).map(of).collect()
-}
-
 /// Samples at the start of a run in which the machine is known to rest; none where it is not known to. It rests where no signal
 /// moves by more than its noise until an input acts, and not before a motion that went before would have shown either.
-fn at_rest(run: &Run, known: &[(f64, f64)], idle: &[f64], criteria: &StartCriteria) -> usize {
+fn at_rest(run: &Run, known: &[(f64, f64)], largest: &[f64], criteria: &StartCriteria) -> usize {
     let soon = |k: &usize| run.time()[*k] - run.time()[0] <= criteria.rest_s;
     let acts = |k: &usize| {
-        run.input(*k)
-            .iter()
-            .zip(idle)
-            .any(|(u, idle)| u.abs() > *idle)
+        let mut inputs = run.input(*k).iter().zip(largest);
+        inputs.any(|(u, largest)| u.abs() > criteria.idle * largest)
     };
     let first = (0..run.len()).find(acts).unwrap_or(run.len());
     let moves = |k: usize| {
@@ -92,7 +82,7 @@ fn of_run(
     run: &Run,
     signal: usize,
     (noise, std): (f64, f64),
-    rests: bool,
+    late_s: f64,
     criteria: &StartCriteria,
 ) -> f64 {
     // An observer corrects the start.
@@ -103,8 +93,7 @@ fn of_run(
     // White noise of variance `σ²` has `6 σ²` in second differences.
     let off = (a - 2.0 * b + c).abs() / 6f64.sqrt();
     let late = (run.time().iter().zip(0..))
-        .take_while(|_| !rests)
-        .take_while(|(t, _)| **t - run.time()[0] <= criteria.late_s)
+        .take_while(|(t, _)| **t - run.time()[0] <= late_s)
         .map(|(_, k)| (run.sample(k)[signal] - a).abs())
         .fold(0.0, f64::max);
     let weight = criteria.wrong * std / noise.max(off).max(late);
@@ -212,7 +201,7 @@ mod tests {
     fn a_start_counts_as_much_as_its_sensor_is_good() {
         let criteria = &StartCriteria::DEFAULT;
         let smooth = run(vec![1.0; 10]);
-        let of = |run: &Run, noise| of_run(run, 0, (noise, 1.0), false, criteria);
+        let of = |run: &Run, noise| of_run(run, 0, (noise, 1.0), criteria.late_s, criteria);
         assert!((of(&smooth, 0.01) - 10.0).abs() < 1e-9);
         // No better than the model, and no better than can be computed with.
         assert_eq!((of(&smooth, 0.5), of(&smooth, 0.0)), (1.0, criteria.most));
@@ -243,13 +232,8 @@ mod tests {
     fn a_machine_rests_until_it_is_driven() {
         let criteria = &StartCriteria::DEFAULT;
         let rest = |acts, moves| {
-            let runs = [driven(acts, moves)];
-            at_rest(
-                &runs[0],
-                &[(0.001, 1.0)],
-                &idle(&runs, criteria.idle),
-                criteria,
-            )
+            let run = driven(acts, moves);
+            at_rest(&run, &[(0.001, 1.0)], &[5.0], criteria)
         };
         // The samples until an input acts, and no more than are soon after the start.
         assert_eq!((rest(1, 9), rest(4, 9), rest(20, 25)), (1, 4, 6));
@@ -257,7 +241,7 @@ mod tests {
         assert_eq!((rest(0, 9), rest(20, 10), rest(1, 3)), (0, 0, 0));
         // How late a sensor may be does not matter at rest.
         let run = driven(4, 9);
-        let of = |rests| of_run(&run, 0, (0.001, 1.0), rests, criteria);
-        assert_eq!((of(true), of(false)), (criteria.most, 1.0));
+        let of = |late_s| of_run(&run, 0, (0.001, 1.0), late_s, criteria);
+        assert_eq!((of(0.0), of(criteria.late_s)), (criteria.most, 1.0));
     }
 }

@@ -194,9 +194,7 @@ impl<'a> Design<'a> {
     fn new(model: &Model, values: &'a [f64], runs: &[Run], work: &Work<'_>) -> Self {
         let criteria = &work.criteria().log;
         let mut model = model.clone();
-        model
-            .effects
-            .retain(|e| !e.meta.memory && e.meta.states == 0);
+        model.effects.retain(|e| !e.meta.is_dynamic());
         let mut deviation = Vec::new();
         let mut noise = Vec::new();
         for (signal, measured) in model.measured.iter().enumerate() {

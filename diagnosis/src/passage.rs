@@ -116,8 +116,7 @@ impl Passage {
         };
         let passes = |place: &Place| self.places.contains(place);
         let suits = Positions::matter_to(effect.meta)
-            && effect.meta.states == 0
-            && !effect.meta.memory
+            && !effect.meta.is_dynamic()
             && effect.at.iter().all(|channel| passes(&channel.place))
             && model.max_step >= self.step;
         if !suits {

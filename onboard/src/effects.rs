@@ -48,11 +48,7 @@ pub const fn acts_aboard(meta: &EffectMeta) -> bool {
         k += 1;
     }
     let timeless = !matches!(meta.shows, Shows::OneRun);
-    on_efforts
-        && timeless
-        && meta.states == 0
-        && !meta.memory
-        && meta.parameters.len() <= PARAMETERS
+    on_efforts && timeless && !meta.is_dynamic() && meta.parameters.len() <= PARAMETERS
 }
 
 /// The most signals that one of these effects reads.

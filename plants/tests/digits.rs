@@ -51,7 +51,7 @@ fn a_static_map_is_evaluated_once_with_the_same_digits() {
             continue;
         }
         names.push(meta.id);
-        assert!(meta.reads.is_empty() && meta.states == 0 && !meta.memory);
+        assert!(meta.reads.is_empty() && !meta.is_dynamic());
         let effect = format!("[[effect]]\n[effect.{}]\n{at}", meta.id);
         let once = model(&format!("{DDMR}{effect}{seen}"));
         let always = model(&format!("{DDMR}{effect}{beside}{seen}"));

@@ -62,6 +62,12 @@ impl Improved {
         assert!(volts.contains(&level), "{level} V");
     }
 
+    /// All that is late is late by this much together, s.
+    fn measures_late(&self, seconds: Range<f64>) {
+        let late = self.late();
+        assert!(seconds.contains(&late), "{late} s");
+    }
+
     /// By how much all that is late is late together, s.
     fn late(&self) -> f64 {
         [
@@ -131,7 +137,7 @@ fn team4277_has_friction_and_measures_late() {
     };
     // What the description of the data says of both.
     found.begins_with_friction(0.55..0.72);
-    assert!((0.06..0.095).contains(&found.late()), "{} s", found.late());
+    found.measures_late(0.06..0.095);
     // A slope of ten degrees on a level floor, and a payload that drops to a tenth, would leave 6 %; friction alone, the same
     // at all speeds, 12 % of it.
     assert!(found.last() < 0.06 * found.unseen[0], "{:?}", found.unseen);
@@ -192,7 +198,7 @@ fn denhams_flywheel_has_friction_and_measures_late() {
         return;
     };
     found.begins_with_friction(0.65..0.75);
-    assert!((0.11..0.135).contains(&found.late()), "{} s", found.late());
+    found.measures_late(0.11..0.135);
     assert!(found.last() < 0.006, "{:?}", found.unseen);
     // Half a percent is left of the quiet parts that judge, where noise would leave a sixth of that. What it is, no effect of
     // the library says, and a second lag does not stand in for it.
@@ -306,24 +312,29 @@ fn a_teaching_board_has_friction_a_driver_that_coasts_and_a_drift() {
     assert!(found.last() < 0.1, "{:?}", found.unseen);
 }
 
+/// What was found in each of these logs: friction first, this strong, and a measurement that is this late.
+fn with_friction_and_late(logs: [(&str, Range<f64>, Range<f64>); 3]) -> Vec<Improved> {
+    let of = |(log, volts, seconds): (&str, Range<f64>, Range<f64>)| {
+        let found = improved(None, &[&format!("frc/more/{log}.json")])?;
+        found.begins_with_friction(volts);
+        found.measures_late(seconds);
+        Some(found)
+    };
+    logs.into_iter().filter_map(of).collect()
+}
+
 /// One drive on three days, logged by a controller that measures late, with wheels that rest at the start of each run. What
 /// the description of the data says of friction and delay.
 #[test]
 #[ignore = "minutes: run in release"]
 fn team1339_has_friction_and_measures_late_on_each_of_three_days() {
     let days = [
-        ("a", 0.40..0.48, 0.070..0.085),
-        ("b", 0.40..0.48, 0.070..0.085),
-        ("c", 0.64..0.72, 0.100..0.120),
+        ("team1339-a", 0.40..0.48, 0.070..0.085),
+        ("team1339-b", 0.40..0.48, 0.070..0.085),
+        ("team1339-c", 0.64..0.72, 0.100..0.120),
     ];
-    for (day, volts, seconds) in days {
-        let Some(found) = improved(None, &[&format!("frc/more/team1339-{day}.json")]) else {
-            return;
-        };
-        found.begins_with_friction(volts);
+    for found in with_friction_and_late(days) {
         assert_eq!(found.added[1], "sensor_delay", "{:?}", found.added);
-        let late = found.late();
-        assert!(seconds.contains(&late), "{day}: {late} s");
     }
 }
 
@@ -336,14 +347,7 @@ fn machines_that_rest_at_first_have_friction_and_measure_late() {
         ("team7028-shooter", 0.44..0.52, 0.125..0.145),
         ("team5409", 0.76..0.82, 0.080..0.095),
     ];
-    for (machine, volts, seconds) in machines {
-        let Some(found) = improved(None, &[&format!("frc/more/{machine}.json")]) else {
-            return;
-        };
-        found.begins_with_friction(volts);
-        let late = found.late();
-        assert!(seconds.contains(&late), "{machine}: {late} s");
-    }
+    with_friction_and_late(machines);
 }
 
 /// A drive whose step forward was made twice, 0.4 s apart: friction, and a measurement that is late. By hand, with the two
@@ -357,8 +361,7 @@ fn a_drive_in_a_log_of_a_whole_session_has_friction_and_measures_late() {
     };
     let friction = found.friction();
     assert!((0.10..0.14).contains(&friction), "{friction} V");
-    let late = found.late();
-    assert!((0.04..0.06).contains(&late), "{late} s");
+    found.measures_late(0.04..0.06);
     assert_eq!(found.added.len(), 2, "{:?}", found.added);
     assert!(found.last() < 0.01, "{:?}", found.unseen);
 }

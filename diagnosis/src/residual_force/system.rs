@@ -1,7 +1,7 @@
 //! How forces pass through the filter: a linear system.
 
 use loopsight_core::Place;
-use loopsight_model::model::{Attached, Model};
+use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_model::simulate::Simulator;
 use nalgebra::{DMatrix, DVector};
@@ -47,8 +47,7 @@ impl System {
         filtered: &[Filtered],
         work: &Work<'_>,
     ) -> Result<Option<Self>, Cancelled> {
-        let keeps = |e: &Attached| e.meta.memory || e.meta.states > 0;
-        if model.effects.iter().any(keeps) {
+        if model.effects.iter().any(|e| e.meta.is_dynamic()) {
             return Ok(None);
         }
         let mut system = Self {

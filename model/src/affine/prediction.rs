@@ -108,10 +108,7 @@ impl Predictor {
         let measured = whole.measured.clone();
         let late = whole.keeping(|i| treatments[i].is_known(), measured.clone());
         // What only falsifies a measurement is not late.
-        let delays = |i: usize| {
-            let meta = whole.effects[i].meta;
-            treatments[i].is_predicted() && (meta.memory || meta.states > 0)
-        };
+        let delays = |i: usize| treatments[i].is_predicted() && whole.effects[i].meta.is_dynamic();
         let only = whole.keeping(delays, measured);
         let of_input = |i: usize| {
             let at = &whole.effects[i].at;
