@@ -331,7 +331,7 @@ fn summary(answer: &InspectAnswer) -> String {
     }
     match answer.plants.first() {
         Some(plant) => text.push_str(&format!(" `{}` fits its channels.", plant.plant)),
-        None => text.push_str(" No plant of the library fits its channels by their names."),
+        None => text.push_str(" No plant of the library fits its channels by their names: say which is which with --plant, --input and --measure."),
     }
     text
 }

@@ -23,7 +23,7 @@ const PLACE: &str = "{}";
 #[serde(deny_unknown_fields)]
 pub struct LogMap {
     /// Column of the time stamps; by default the first column whose name begins with `time` or
-    /// is `t`, with a unit of time.
+    /// is `t`, with a unit of time; of a CSV file without one the first in a unit of time that rises throughout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<ColumnMap>,
     /// Time from one row to the next, s, of a log without time stamps.

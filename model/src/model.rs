@@ -20,7 +20,7 @@ use crate::config::{ConfigError, PathSegment, TomlSource, nearest, read_text};
 use crate::log_map::{ColumnMap, Hold, LogMap};
 pub use crate::pseudo_inverse::pseudo_inverse;
 use crate::registry::{AnyDynamics, HostReal};
-use crate::sensor::Sensor;
+use crate::sensor::{Encoder, Sensor};
 pub use attached::{Attached, MeasuredSignal};
 pub use error::ModelError;
 pub use file::{FitTable, ModelFile, SimulationTable};
@@ -222,6 +222,9 @@ impl Model {
                         None,
                     ));
                 }
+                if let Some(problem) = self.counts_no_speed(index, encoder) {
+                    return Err(problem);
+                }
                 for (shaft, gain) in &encoder.of {
                     self.find_signal(shaft)
                         .map_err(|(m, h)| (id.clone(), m, h))?;
@@ -242,6 +245,32 @@ impl Model {
         measured.sort_by_key(|m| m.index);
         self.measured = measured;
         Ok(())
+    }
+
+    /// What is wrong with counts behind a signal that is itself the angle or the way that is counted; none where it is not.
+    fn counts_no_speed(
+        &self,
+        index: usize,
+        encoder: &Encoder,
+    ) -> Option<(String, String, Option<String>)> {
+        let signal = signals(self.plant).nth(index)?;
+        let (speed, _) =
+            (self.plant.integrals.iter()).find(|(_, integral)| *integral == signal.id)?;
+        let message = format!(
+            "`{}` is what is counted: `encoder_counts` says how a speed, `{speed}`, is made of counts between two samples",
+            signal.id
+        );
+        let scale = match signal.unit {
+            "rad" => format!(
+                "`unit = \"rev\"` and `scale = {}`",
+                1.0 / encoder.counts_per_revolution
+            ),
+            unit => format!("`unit = \"{unit}\"`, and as `scale` what one count is"),
+        };
+        let help = format!(
+            "leave `sensor` out, for it is read at the time stamp; of a column of counts say {scale}"
+        );
+        Some((signal.id.to_owned(), message, Some(help)))
     }
 
     /// Index among the measured signals of the plant's signal `index`; none where nothing measures it itself.

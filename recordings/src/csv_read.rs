@@ -20,6 +20,7 @@ use quick::Unusual;
 
 use crate::dialect::{self, delimiter, number};
 use crate::error::RecordingError;
+use crate::naming::{is_time, unit_of_time};
 use crate::source::as_text;
 use crate::stamp::nanoseconds;
 use crate::table::{ColumnName, Table, TableRun};
@@ -154,14 +155,20 @@ impl<'l> Rows<'l> {
         }
         (run.first_line, run.lines) = self.lines.first_and_all();
         let width = self.columns.len().max(1);
-        let first = || run.rows.iter().step_by(width);
-        let rising = !self.named && width > 1 && first().zip(first().skip(1)).all(|(a, b)| a < b);
+        let column = |at: usize| run.rows.iter().skip(at).step_by(width);
+        let rises = |at: usize| {
+            let mut steps = column(at).zip(column(at).skip(1)).peekable();
+            steps.peek().is_some() && steps.all(|(a, b)| a < b)
+        };
+        let dates = self.origins.into_keys().next();
+        let mut columns = self.columns;
+        let stamps = dates.or_else(|| stamps(&mut columns, self.named, rises));
         Ok(Table {
             source: log.into(),
-            columns: self.columns,
+            columns,
             runs: vec![run],
             labels: self.labels,
-            stamps: (self.origins.into_keys().next()).or(rising.then_some(0)),
+            stamps,
             ..Table::default()
         })
     }
@@ -264,6 +271,23 @@ impl<'l> Rows<'l> {
     fn name(&self, at: usize) -> &str {
         self.columns.get(at).map_or("", |c| c.text.as_str())
     }
+}
+
+/// The column of time stamps where no name says it: of a file without a header the first one, or else the first that is in
+/// a unit of time, which it has from then on; it `rises` throughout.
+fn stamps(columns: &mut [ColumnName], named: bool, rises: impl Fn(usize) -> bool) -> Option<usize> {
+    if !named {
+        return (columns.len() > 1 && rises(0)).then_some(0);
+    }
+    if columns.iter().any(|column| is_time(&column.name)) {
+        return None;
+    }
+    let units = columns.iter().map(|column| unit_of_time(column));
+    let (at, unit) = (units.enumerate())
+        .filter_map(|(at, unit)| Some((at, unit?.to_owned())))
+        .find(|(at, _)| rises(*at))?;
+    columns[at].unit = Some(unit);
+    Some(at)
 }
 
 fn header(
@@ -373,6 +397,22 @@ mod tests {
         assert_eq!((table.runs[0].first_line, table.stamps), (1, Some(0)));
         let table = parse_csv("0,5;1,25\n1,0;2,5\n", "l").unwrap();
         assert_eq!(table.runs[0].rows, [0.5, 1.25, 1.0, 2.5]);
+    }
+
+    #[test]
+    fn a_column_that_rises_in_a_unit_of_time_is_the_time() {
+        let stamps = |text: &str| {
+            let table = parse_csv(text, "l").unwrap();
+            let unit = |at: usize| table.columns[at].unit.clone().unwrap();
+            table.stamps.map(|at| (at, unit(at)))
+        };
+        let some = |at: usize, unit: &str| Some((at, unit.to_owned()));
+        assert_eq!(stamps("us,pwm\n0,1\n50000,2\n"), some(0, "us"));
+        assert_eq!(stamps("u_V;Zeit [ms]\n1;0,5\n1;20,5\n"), some(1, "ms"));
+        // A time that something takes goes up and down, a radius is no time, and a name comes first.
+        assert_eq!(stamps("latency_ms,u\n3,1\n2,2\n"), None);
+        assert_eq!(stamps("radius,u\n3,1\n4,2\n"), None);
+        assert_eq!(stamps("age_ms,time_s\n3,1\n4,2\n"), None);
     }
 
     #[test]

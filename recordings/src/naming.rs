@@ -2,6 +2,8 @@
 
 use loopsight_core::unit::{parse, split_name};
 
+use crate::table::ColumnName;
+
 /// Kelvin of a degree, and kelvin at zero.
 const CELSIUS: (f64, f64) = (1.0, 273.15);
 const FAHRENHEIT: (f64, f64) = (5.0 / 9.0, 459.67 * 5.0 / 9.0);
@@ -130,6 +132,15 @@ pub(crate) fn is_time(name: &str) -> bool {
     let name = plain(name);
     let alone = || time(&name).is_some_and(|(rest, _)| rest == name);
     name == "t" || TIME_NAMES.iter().any(|n| name.starts_with(n)) || alone()
+}
+
+/// The unit of a column of times, by its header: one that ends with a unit of time, or is one that is hardly anything else.
+pub(crate) fn unit_of_time(column: &ColumnName) -> Option<&str> {
+    let second = parse("s").ok().map(|s| s.dimension);
+    let of_time = |unit: &&str| parse(unit).ok().map(|u| u.dimension) == second;
+    let unit = column.unit.as_deref().filter(of_time);
+    let alone = ["ms", "us", "µs", "ns"].contains(&column.text.as_str());
+    unit.or(alone.then_some(&column.text))
 }
 
 /// A name as ids are written: small letters, words joined by `_`.

@@ -358,13 +358,17 @@ impl Finder<'_> {
             }
             None => {
                 if !expected.dimension.is_one() {
+                    let mut detail =
+                        format!("the column `{header}` does not say its unit; taken as {si}");
+                    if si == "rad" && scale == 1.0 && self.is_counted(column) {
+                        detail += ". It holds whole numbers alone, as counts do: of counts say `unit = \"rev\"`, and as \
+                                   `scale` one over the counts in a turn";
+                    }
                     self.notes.push(Fault {
                         kind: FaultKind::UnitAssumed,
                         run: String::new(),
                         signal: id.into(),
-                        detail: format!(
-                            "the column `{header}` does not say its unit; taken as {si}"
-                        ),
+                        detail,
                     });
                 }
                 1.0
@@ -375,6 +379,23 @@ impl Finder<'_> {
             factor: factor * scale,
             offset: 0.0,
         })
+    }
+
+    /// Whether a column changes and holds nothing but whole numbers, which no angle in radians does.
+    fn is_counted(&self, column: usize) -> bool {
+        let width = self.table.columns.len().max(1);
+        let rows = self.table.runs.iter().flat_map(|run| run.rows.iter());
+        let mut values = rows.skip(column).step_by(width).filter(|v| v.is_finite());
+        let Some(first) = values.next() else {
+            return false;
+        };
+        let mut changes = false;
+        first.fract() == 0.0
+            && values.all(|v| {
+                changes |= v != first;
+                v.fract() == 0.0
+            })
+            && changes
     }
 
     fn unit(&self, column: &str, unit: &str) -> Result<Unit, RecordingError> {

@@ -21,7 +21,7 @@ pub(super) static TABLES: [PartMeta; 3] = [
             key(
                 "time",
                 "",
-                "column of the time stamps: a name, or `{ column, unit, scale }`; by default the first column whose name begins with `time` or is `t`",
+                "column of the time stamps: a name, or `{ column, unit, scale }`; by default the first column whose name begins with `time` or is `t`, of a CSV file without one the first in a unit of time that rises throughout",
             ),
             key(
                 "period_s",
@@ -105,7 +105,7 @@ pub(super) static TABLES: [PartMeta; 3] = [
             key(
                 "measured.ID.sensor",
                 "",
-                "how the number is made: `\"instantaneous\"` (the default), `\"interval_mean\"`, or `encoder_counts` with the keys below",
+                "how the number is made: `\"instantaneous\"` (the default; an angle that is counted, too), `\"interval_mean\"`, or, of a speed, `encoder_counts` with the keys below",
             ),
             key(
                 "measured.ID.sensor.encoder_counts.counts_per_revolution",

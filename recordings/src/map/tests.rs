@@ -116,6 +116,40 @@ fn a_missing_unit_is_assumed_and_named() {
 }
 
 #[test]
+fn an_angle_in_whole_numbers_is_said_to_look_like_counts() {
+    let said = |angles: &str, scale: f64| {
+        let rows: String = (angles.split(' ').enumerate())
+            .map(|(k, angle)| format!("{k},1,{angle}\n"))
+            .collect();
+        let angle = Measured {
+            column: Some("ticks".into()),
+            scale: Some(scale),
+            ..Measured::default()
+        };
+        let log_map = LogMap {
+            measured: BTreeMap::from([("angle".into(), angle)]),
+            ..LogMap::default()
+        };
+        let text = format!("time_s,voltage_V,ticks\n{rows}");
+        let faults = mapped(&text, &log_map).unwrap().faults;
+        let mut assumed = faults
+            .into_iter()
+            .filter(|f| f.kind == FaultKind::UnitAssumed);
+        assumed.next().unwrap().detail
+    };
+    let hint = "whole numbers alone";
+    assert!(said("0 15 -31", 1.0).contains(hint));
+    // Counts that were made an angle, an angle, and one that stands.
+    for (angles, scale) in [("0 15 -31", 0.01), ("0 1.5 -31", 1.0), ("3 3 3", 1.0)] {
+        let said = said(angles, scale);
+        assert!(
+            said.contains("taken as rad") && !said.contains(hint),
+            "{said}"
+        );
+    }
+}
+
+#[test]
 fn errors_name_the_nearest_and_all_columns() {
     let ok = LogMap::default();
     let wrong_id = LogMap {

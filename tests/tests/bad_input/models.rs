@@ -41,6 +41,12 @@ fn spoilt_models() {
             &["two ways", "spoilt.toml:"],
         ),
         (
+            // A count of an angle is no speed.
+            "[plant.dc_axis]\n[log.measured.angle]\nsensor.encoder_counts = { counts_per_revolution = 2048 }\n"
+                .to_owned(),
+            &["`angle`", "`speed`", "spoilt.toml:2:", "`unit = \"rev\"` and `scale = 0.00048828125`"],
+        ),
+        (
             "[plant.dc_axis]\nK_A = -1.0\nK_C = 1.0\n[plant.ddmr]\n".to_owned(),
             &["dc_axis", "ddmr", "spoilt.toml:4:"],
         ),
