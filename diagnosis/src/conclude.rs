@@ -24,8 +24,8 @@ pub(crate) struct Evidence<'a> {
     pub(crate) floor: f64,
     /// A quantity of the model predicts the residuals, on blocks that it was not chosen by.
     pub(crate) predictable: bool,
-    /// Least share of the standard deviation that an explanation must account for.
-    pub(crate) least: f64,
+    /// See [`Aim`](crate::diagnose::Aim).
+    pub(crate) worth: f64,
 }
 
 /// Puts the explanations of the diagnosis, those of the `finalists`, in order, says which of them is
@@ -145,7 +145,21 @@ impl Evidence<'_> {
             && self.above_floor(self.error())
             && nrmse(&judged.losses) <= criteria.no_worse * self.error()
             && explanation.significance > criteria.certain
-            && explained > (criteria.matters * self.nominal.floor).max(self.least)
+            && explained
+                > (criteria.matters * self.nominal.floor)
+                    .max(self.least(self.nominal_fit, explanation.nrmse_fit))
+    }
+
+    /// Least share of the standard deviation that an explanation must account for where it lowers an `error` to what is
+    /// `left`. What removes nearly all of a small error is no imperfection of a sensor: an angle that wanders by many turns has
+    /// a large standard deviation, and whatever is missing a small share of it.
+    fn least(&self, error: f64, left: f64) -> f64 {
+        let criteria = self.missing();
+        if left <= criteria.most_left * error {
+            self.worth
+        } else {
+            self.worth.max(criteria.least_share)
+        }
     }
 
     /// Whether the chosen explanation is what is missing: significantly better than no effect, better by enough
@@ -153,11 +167,13 @@ impl Evidence<'_> {
     fn is_missing(&self, judged: &Judged, explanation: &Explanation) -> bool {
         let criteria = self.missing();
         let left = nrmse(&judged.rank);
-        let explained = explained(nrmse(self.nominal.rank), left);
+        let error = nrmse(self.nominal.rank);
+        let explained = explained(error, left);
         // It leaves hardly more than noise, or it explains a good part of the error.
         let complete =
             left < criteria.complete * self.floor && explained > criteria.matters * self.floor;
-        let matters = complete || explained > (criteria.matters * self.floor).max(self.least);
+        let matters =
+            complete || explained > (criteria.matters * self.floor).max(self.least(error, left));
         self.earned(judged, explanation)
             && explanation.significance > criteria.significant
             && (matters || self.shown_by_starts(judged, explanation))

@@ -54,7 +54,7 @@ pub fn diagnose(
     work: &Work<'_>,
 ) -> Result<Diagnosis, FitError> {
     let aim = Aim {
-        least: work.criteria().missing.least_share,
+        worth: 0.0,
         discover: Discover::Never,
         force: true,
     };
@@ -70,8 +70,8 @@ pub fn diagnose(
 /// What a diagnosis is for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Aim {
-    /// Least share of the standard deviation that an explanation must account for.
-    pub(crate) least: f64,
+    /// Least share of the standard deviation that an explanation must account for to be worth its while.
+    pub(crate) worth: f64,
     pub(crate) discover: Discover,
     /// Whether it says what force is missing where no effect explains the rest.
     pub(crate) force: bool,
@@ -242,7 +242,7 @@ fn conclude_from(
         nominal_fit: diagnosis.nominal_fit,
         floor: diagnosis.floor.nrmse,
         predictable: predictable(nominal.model, nominal.solution, runs, work)?,
-        least: aim.least,
+        worth: aim.worth,
     };
     let mut verdict = conclude(diagnosis, &finalists, &evidence);
     if verdict == Conclusion::UnknownEffect && aim.force {

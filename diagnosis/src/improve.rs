@@ -171,10 +171,9 @@ impl State {
     /// What the next diagnosis is for.
     fn aim(&self, work: &Work<'_>) -> Aim {
         let first = self.diagnoses.first().map(|d| d.nominal.nrmse);
-        let criteria = work.criteria();
-        let (worth, least) = (criteria.improve.worth, criteria.missing.least_share);
+        let worth = work.criteria().improve.worth;
         Aim {
-            least: first.map_or(least, |nrmse| (worth * nrmse).max(least)),
+            worth: first.map_or(0.0, |nrmse| worth * nrmse),
             discover: self.discover,
             force: true,
         }

@@ -138,6 +138,7 @@ mod settings;
 mod shows;
 mod sizes;
 mod solve;
+mod speeds;
 mod split;
 mod stamps;
 mod starts;

@@ -107,7 +107,10 @@ fn left_by(
     // Errors are only compared under the same observer.
     let alike = second.observer.is_some() == diagnosis.observer.is_some();
     let (before, left, floor) = (diagnosis.nominal.nrmse, found.nrmse, diagnosis.floor.nrmse);
-    let matters = explained(before, left) > (criteria.missing.matters * floor).max(aim.least);
+    let matters = explained(before, left)
+        > (criteria.missing.matters * floor)
+            .max(criteria.missing.least_share)
+            .max(aim.worth);
     (alike && matters && left < criteria.improve.better * before).then_some(left)
 }
 

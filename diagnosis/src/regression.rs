@@ -9,13 +9,15 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::error::FitError;
 use crate::progress::{Cancelled, Work};
+use crate::speeds::Speeds;
 
-/// Calls `each(row, time, φ, y)` for every regression that the samples of `runs` give.
+/// Calls `each(row, time, φ, y)` for every regression that the samples of `runs` give, read as `speeds` say.
 ///
 /// A sample less than `span` s after the last one used is skipped, and its inputs are averaged into the next: a
 /// difference over a longer time has less noise.
 pub(crate) fn for_each_row(
     regression: &mut Regression,
+    speeds: &Speeds<'_>,
     runs: &[Run],
     span: f64,
     work: &Work<'_>,
@@ -26,6 +28,7 @@ pub(crate) fn for_each_row(
         regression.restart();
         let mut input = vec![0.0; run.n_inputs()];
         let mut last = 0;
+        let mut read = Vec::new();
         for k in 0..run.len() {
             work.go_on()?;
             if k > 0 && run.time()[k] - run.time()[last] < span {
@@ -45,8 +48,9 @@ pub(crate) fn for_each_row(
                         };
                 }
             }
+            speeds.read(run, last, k, &mut read);
             last = k;
-            if regression.push(run.time()[k], run.sample(k), &input) {
+            if regression.push(run.time()[k], &read, &input) {
                 for row in 0..regression.len() {
                     let (phi, y) = regression.row(row);
                     each(row, offset + run.time()[k], phi, y);
@@ -78,22 +82,30 @@ pub(crate) fn batch(
             parameter.free = false;
         }
     }
-    let mut regression = Regression::new(&linear, scheme)?;
+    let speeds = Speeds::of(&linear);
+    let mut regression = Regression::new(&speeds.model, scheme)?;
     let mut grams: Vec<(DMatrix<f64>, DVector<f64>)> = (0..regression.len())
         .map(|row| {
             let n = regression.parameters(row).len();
             (DMatrix::zeros(n, n), DVector::zeros(n))
         })
         .collect();
-    for_each_row(&mut regression, runs, span, work, |row, _, phi, y| {
-        let (gram, right) = &mut grams[row];
-        for (i, a) in phi.iter().enumerate() {
-            right[i] += a * y;
-            for (j, b) in phi.iter().enumerate() {
-                gram[(i, j)] += a * b;
+    for_each_row(
+        &mut regression,
+        &speeds,
+        runs,
+        span,
+        work,
+        |row, _, phi, y| {
+            let (gram, right) = &mut grams[row];
+            for (i, a) in phi.iter().enumerate() {
+                right[i] += a * y;
+                for (j, b) in phi.iter().enumerate() {
+                    gram[(i, j)] += a * b;
+                }
             }
-        }
-    })?;
+        },
+    )?;
     let mut values: Vec<f64> = linear
         .parameters
         .iter()

@@ -16,6 +16,7 @@ use crate::fitted::Fit;
 use crate::progress::{Stage, Work};
 use crate::regression::{Regression, for_each_row};
 use crate::settings::{FitSettings, Method};
+use crate::speeds::Speeds;
 
 /// Samples of the estimate's history that are kept for pictures.
 const HISTORY: usize = 2000;
@@ -35,7 +36,8 @@ pub(crate) fn fit(
         return Err(FitError::PerRun { parameter });
     }
     let criteria = &work.criteria().parameters;
-    let mut regression = Regression::new(model, settings.scheme)?;
+    let speeds = Speeds::of(model);
+    let mut regression = Regression::new(&speeds.model, settings.scheme)?;
     let mut estimators = Vec::new();
     for row in 0..regression.len() {
         estimators.push(estimator(regression.parameters(row).len())?);
@@ -57,27 +59,34 @@ pub(crate) fn fit(
             Some(first)
         })
         .collect();
-    let done = for_each_row(&mut regression, runs, 0.0, work, |row, time, phi, y| {
-        let innovation = estimators[row].update(phi, y);
-        if !innovation.accepted {
-            return;
-        }
-        // A-priori error over its relative variance: the residual sum of squares of the whole
-        // regression, recursively (Åström, Wittenmark 2008, section 2.2).
-        sums[row].0 += innovation.innovation.powi(2) / innovation.relative_variance;
-        sums[row].1 += 1.0;
-        if row == 0 {
-            samples += 1;
-            if samples.is_multiple_of(256) {
-                work.tell(Stage::Fitting, samples, total as u64);
+    let done = for_each_row(
+        &mut regression,
+        &speeds,
+        runs,
+        0.0,
+        work,
+        |row, time, phi, y| {
+            let innovation = estimators[row].update(phi, y);
+            if !innovation.accepted {
+                return;
             }
-        }
-        if samples.is_multiple_of(every as u64) {
-            for (k, theta) in estimators[row].theta().iter().enumerate() {
-                history[offsets[row] + k].1.push((time, *theta));
+            // A-priori error over its relative variance: the residual sum of squares of the whole
+            // regression, recursively (Åström, Wittenmark 2008, section 2.2).
+            sums[row].0 += innovation.innovation.powi(2) / innovation.relative_variance;
+            sums[row].1 += 1.0;
+            if row == 0 {
+                samples += 1;
+                if samples.is_multiple_of(256) {
+                    work.tell(Stage::Fitting, samples, total as u64);
+                }
             }
-        }
-    });
+            if samples.is_multiple_of(every as u64) {
+                for (k, theta) in estimators[row].theta().iter().enumerate() {
+                    history[offsets[row] + k].1.push((time, *theta));
+                }
+            }
+        },
+    );
 
     let mut values: Vec<f64> = model.values();
     let mut parameters = BTreeMap::new();
