@@ -1,11 +1,11 @@
 //! The candidates of a diagnosis: every effect at every channel where it could be added to the model.
 
 use loopsight_core::{EffectMeta, Role};
-use loopsight_model::model::Model;
+use loopsight_model::model::{Model, ModelParameter};
 use loopsight_model::registry;
 use loopsight_model::run::Run;
 
-use crate::commands::largest_inputs;
+use crate::commands::{largest_at, largest_inputs};
 use crate::criteria::SearchCriteria;
 use crate::ends::Ends;
 use crate::estimate::ParameterVerdict;
@@ -33,6 +33,8 @@ pub(crate) struct Candidate {
     pub(crate) flow: f64,
     /// The same of the position.
     pub(crate) reach: f64,
+    /// The largest command in the recording, in the unit of its channels; none where no input has that.
+    pub(crate) command: Option<f64>,
     /// Where the position (or head) at its channels ends in the recording.
     pub(crate) ends: Ends,
     /// It can be tried at the measured positions: it reads a position, and no observer corrects the free runs.
@@ -43,7 +45,42 @@ pub(crate) struct Candidate {
     pub(crate) entries: Option<String>,
 }
 
+/// Share of the largest command that a coefficient moves at most where a candidate begins: beyond it the start is another machine,
+/// whose free run says nothing of this one.
+const START: f64 = 0.1;
+
 impl Candidate {
+    /// How far from neutral one of its parameters begins. That is the size of the declaration, for machines that move by a radian or
+    /// a metre in a second. A coefficient of a power of a speed or a way moves a tenth of the largest command at most: at a
+    /// wheel that turns with 600 rad/s the declared size of a drag is 8000 V.
+    pub(crate) fn first_step(&self, parameter: &ModelParameter) -> f64 {
+        let declared = parameter.scale();
+        let moves = self
+            .way(parameter.declaration.unit)
+            .map(|way| declared * way);
+        match (moves, self.command) {
+            (Some(moves), Some(command)) if moves > START * command && command > 0.0 => {
+                declared * START * command / moves
+            }
+            _ => declared,
+        }
+    }
+
+    /// What a coefficient of `unit` is multiplied with in the recording; none where it is no coefficient of speeds and ways.
+    fn way(&self, unit: &str) -> Option<f64> {
+        let ways = unit.strip_prefix("channel/")?.split('/');
+        ways.map(|factor| {
+            let (name, power) = factor.split_once('^').unwrap_or((factor, "1"));
+            let moved = match name {
+                "flow" => self.flow,
+                "position" => self.reach,
+                _ => return None,
+            };
+            Some(moved.powi(power.parse().ok()?))
+        })
+        .product()
+    }
+
     /// Parameters of the model that the candidate brought, by index.
     pub(crate) fn own(&self) -> std::ops::Range<usize> {
         let first = self.model.effects.len() - self.instances();
@@ -318,6 +355,7 @@ pub(crate) fn candidates(
                         by_position: !observed && Positions::matter_to(meta),
                         widths: widths(&model, rms, sign_width),
                         reach: last_rms(&model, Role::Position, rms),
+                        command: last_command(&model, &largest),
                         ends: last_ends(&model, ends),
                         model,
                         flow,
@@ -330,6 +368,11 @@ pub(crate) fn candidates(
     found
 }
 
+/// The largest command in the unit of the channels of the last effect of a model.
+fn last_command(model: &Model, largest: &[f64]) -> Option<f64> {
+    largest_at(model, model.effects.last()?.at.first()?, largest)
+}
+
 #[cfg(test)]
 mod tests {
     use loopsight_plants as _;
@@ -339,6 +382,35 @@ mod tests {
     const ROBOT: &str = "[plant.ddmr]\nK_B = 0.0\nK_E = 0.0\nhalf_track = 0.3\nwheel_radius = 0.07\n\
                          [log.measured]\ntrack_speed_right = { sensor = \"instantaneous\" }\n\
                          track_speed_left = { sensor = \"instantaneous\" }\n";
+
+    /// A wheel that turns with 600 rad/s under 12 V, and one that turns with 0.1 rad/s.
+    #[test]
+    fn a_drag_begins_with_what_a_machine_can_have() {
+        let text = "[plant.dc_axis]\nK_A = -1.0\nK_C = 8.0\n[log.measured.speed]\n";
+        let (axis, _) = Model::from_toml("axis.toml", text).unwrap();
+        let step = |flow: f64| {
+            let model = axis.with_effect("quadratic_drag", &["shaft"]).unwrap();
+            let candidate = Candidate {
+                meta: model.effects[0].meta,
+                at: vec!["shaft"],
+                separate: false,
+                further: false,
+                replaces: None,
+                flow,
+                reach: 0.0,
+                command: last_command(&model, &[12.0]),
+                ends: [None; 2],
+                by_position: false,
+                widths: Vec::new(),
+                entries: None,
+                model,
+            };
+            candidate.first_step(&candidate.model.parameters[candidate.own().start])
+        };
+        let declared = 0.02;
+        assert!((step(600.0) * 600.0 * 600.0 / 1.2 - 1.0).abs() < 1e-12);
+        assert_eq!(step(0.1), declared);
+    }
 
     /// The candidates, where this part of the robot does not show; all where none is named.
     fn tried(unshown: Option<&str>) -> Vec<Candidate> {

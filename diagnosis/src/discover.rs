@@ -55,6 +55,7 @@ fn candidate(expression: &ForceExpression, nominal: &Nominal<'_>) -> Option<Cand
         further: false,
         replaces: None,
         flow: 0.0,
+        command: None,
         reach: 0.0,
         ends: [None; 2],
         by_position: false,

@@ -22,7 +22,8 @@ use crate::stamps::shortest_period;
 ///   differ by more than white noise of the same size would, every other sample does not. The noise is never below
 ///   the rounding of the log, its least change `q` over `√12`.
 /// * A sensor may be noisier while the machine moves (a speed by a differentiating filter, which is quiet at rest). So
-///   medians are those of short blocks, and their squares are averaged.
+///   medians are those of blocks of a hundred values or more, and their squares are averaged. Rows of samples that are shorter
+///   share blocks.
 /// * A coarse log, which changes by one step of `q` or two at a time, has its noise in few values. Then the median
 ///   is that of grouped data: values are spread evenly over their step, and what that adds, `q²/12`, is taken off.
 /// * A sensor that is read more often than it has a new value (a bus that updates every 20 ms): the age of its
@@ -198,8 +199,11 @@ fn white(runs: &[Vec<f64>], step: f64) -> f64 {
     let least = (1..=ORDERS)
         .flat_map(|order| (1..=SPACINGS).map(move |spacing| (order, spacing)))
         .filter_map(|(order, spacing)| {
-            let of_runs: Vec<Vec<f64>> = runs.iter().map(|r| sizes(r, order, spacing)).collect();
-            let blocks = || of_runs.iter().flat_map(|run| run.chunks(block(run.len())));
+            let of_runs = runs.iter().map(|run| sizes(run, order, spacing));
+            let (mut rows, short): (Vec<_>, Vec<_>) = of_runs.partition(|row| row.len() >= BLOCK);
+            // A median of few values follows the motion.
+            rows.push(short.concat());
+            let blocks = || rows.iter().flat_map(|row| row.chunks(block(row.len())));
             let variance = |block: &[f64]| {
                 let spread = grouped_median(block.to_vec(), step) / 0.6745;
                 (spread * spread - step * step / 12.0).max(0.0) / gain(order)

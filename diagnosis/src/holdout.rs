@@ -12,6 +12,18 @@ use crate::prediction::{InitialStates, Solution};
 use crate::progress::{Cancelled, Work};
 use crate::score::Tally;
 
+/// How long the blocks of a run are, s. A slow process has few samples in the usual time; blocks of one or two samples would
+/// be told by their neighbours, and where a sample is as long as all blocks between two that are held out, they would all be.
+fn block(run: &Run, criteria: &HoldoutCriteria) -> f64 {
+    let duration = run.duration();
+    let usual = (duration / criteria.blocks as f64)
+        .max(criteria.shortest_s)
+        .min(criteria.longest_s);
+    let enough = criteria.samples as f64 * run.median_period();
+    // One in so many must come up twice.
+    usual.max(enough.min(duration / (2 * criteria.every.max(2)) as f64))
+}
+
 /// Recordings divided into fitting data and validation data.
 pub(crate) struct Holdout<'a> {
     pub(crate) runs: &'a [Run],
@@ -46,9 +58,7 @@ impl<'a> Holdout<'a> {
             runs.iter()
                 .enumerate()
                 .map(|(index, run)| {
-                    let block = (run.duration() / criteria.blocks as f64)
-                        .max(criteria.shortest_s)
-                        .min(criteria.longest_s);
+                    let block = block(run, criteria);
                     (0..run.len())
                         .map(|k| {
                             let t = run.time()[k - k % group];

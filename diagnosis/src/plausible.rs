@@ -58,6 +58,7 @@ mod tests {
             replaces: None,
             flow: 1.0,
             reach: 1.0,
+            command: None,
             ends: [None; 2],
             by_position: false,
             widths: Vec::new(),

@@ -156,7 +156,12 @@ impl Search<'_> {
         let explanation = explain(&judged, &fit, self.nominal).ok()?;
         let criteria = self.work.criteria();
         let stands_in = is_the_same_both_ways(&judged.candidate, &explanation, criteria);
-        let acts = does_something(&explanation, criteria.search.does_nothing, self.shift);
+        let acts = does_something(
+            &judged.candidate,
+            &explanation,
+            criteria.search.does_nothing,
+            self.shift,
+        );
         let simpler = is_a_simpler_one(&judged.candidate, &explanation, self.extent.period);
         (acts && !stands_in && !simpler).then_some((judged, explanation))
     }

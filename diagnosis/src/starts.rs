@@ -178,7 +178,7 @@ fn starts(
             let step = if neutral_first {
                 0.0
             } else {
-                parameter.scale()
+                candidate.first_step(parameter)
             };
             vec![nearest(neutral + step)]
         } else {

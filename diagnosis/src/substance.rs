@@ -5,8 +5,14 @@ use crate::conclusion::Explanation;
 use crate::estimate::ParameterVerdict;
 
 /// Whether an effect has any size: a parameter whose neutral value is zero is above the share `least` of its
-/// noticeable size, a time above `shift` (s). Where it has none, any parameter must be as far from its neutral value.
-pub(crate) fn does_something(explanation: &Explanation, least: f64, shift: f64) -> bool {
+/// noticeable size, which for a coefficient is that at the speeds of the recording, a time above `shift` (s). Where it has none,
+/// any parameter must be as far from its neutral value.
+pub(crate) fn does_something(
+    candidate: &Candidate,
+    explanation: &Explanation,
+    least: f64,
+    shift: f64,
+) -> bool {
     let model = &explanation.model;
     let place = &explanation.place;
     let own = model.effects.iter().filter(|effect| {
@@ -29,7 +35,7 @@ pub(crate) fn does_something(explanation: &Explanation, least: f64, shift: f64) 
         .any(|p| {
             let away = p.value.zip(p.declaration.default);
             let shift = if p.is_time() { shift } else { 0.0 };
-            let enough = shift.max(least * p.scale());
+            let enough = shift.max(least * candidate.first_step(p));
             away.is_none_or(|(value, neutral)| (value - neutral).abs() > enough)
         })
 }

@@ -45,6 +45,8 @@ pub enum FaultKind {
     RestingStart,
     /// Voltages logged as magnitudes; their signs were reconstructed.
     UnsignedVoltage,
+    /// An angle that begins anew after each turn, or a counter that runs over; it was taken as going on.
+    Wrapped,
     /// A column that does not say its unit; SI was assumed.
     UnitAssumed,
     /// A file that ends too early; what is before the cut was read.
@@ -75,6 +77,7 @@ impl FaultKind {
             FaultKind::BrokenRun => "broken_run",
             FaultKind::RestingStart => "resting_start",
             FaultKind::UnsignedVoltage => "unsigned_voltage",
+            FaultKind::Wrapped => "wrapped",
             FaultKind::UnitAssumed => "unit_assumed",
             FaultKind::CutLog => "cut_log",
             FaultKind::Implausible => "implausible",
@@ -127,6 +130,7 @@ impl Fault {
             | FaultKind::IrregularTime
             | FaultKind::RestingStart
             | FaultKind::UnsignedVoltage
+            | FaultKind::Wrapped
             | FaultKind::UnitAssumed => Severity::Note,
             FaultKind::BrokenRun => Severity::Fatal,
             FaultKind::DeadSensor

@@ -4,6 +4,7 @@ mod held;
 mod short;
 mod side_by_side;
 mod tally;
+mod turns;
 mod values;
 
 use std::borrow::Cow;
@@ -141,6 +142,7 @@ fn one<'s>(
     };
     found.extend(plan.notes.iter().cloned());
     let measured_ids: Vec<&str> = plan.measured.iter().map(|(_, m)| m.id.as_str()).collect();
+    found.extend(turns::go_on(&mut recording, &plan));
     found.extend(faults::take_out_spikes(&mut recording, &measured_ids));
     recording.faults = found;
     Ok((recording, table, plan))

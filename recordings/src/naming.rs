@@ -27,7 +27,13 @@ const TEMPERATURES: [(&str, (f64, f64)); 12] = [
 /// Beginnings of the names of columns of time stamps.
 const TIME_NAMES: [&str; 4] = ["time", "timestamp", "stamp", "elapsed"];
 /// Words of time that stand at the end of names.
-const TIMES: [(&str, &str); 14] = [
+const TIMES: [(&str, &str); 20] = [
+    ("second", "s"),
+    ("seconds", "s"),
+    ("minute", "min"),
+    ("minutes", "min"),
+    ("hour", "h"),
+    ("hours", "h"),
     ("millis", "ms"),
     ("millisecond", "ms"),
     ("milliseconds", "ms"),
@@ -57,8 +63,8 @@ fn time(text: &str) -> Option<(&str, &'static str)> {
     let camel = name.ends_with(char::is_lowercase) && ending.starts_with(char::is_uppercase);
     let name = name.trim_end_matches(['_', ' ', '-', '.']);
     match name.is_empty() {
-        // `millis` alone is a time; `sec` is an effort somewhere.
-        true if word.len() > 4 => Some((text, unit)),
+        // `millis` alone is a time; `sec` is an effort somewhere, and `hours` may be those of a day.
+        true if word.len() > 4 && !["s", "min", "h"].contains(&unit) => Some((text, unit)),
         false if apart || camel => Some((name, unit)),
         _ => None,
     }
@@ -134,13 +140,24 @@ pub(crate) fn is_time(name: &str) -> bool {
     name == "t" || TIME_NAMES.iter().any(|n| name.starts_with(n)) || alone()
 }
 
-/// The unit of a column of times, by its header: one that ends with a unit of time, or is one that is hardly anything else.
+/// The unit of a column of times, by its header: one that ends with a unit of time, or is nothing else.
 pub(crate) fn unit_of_time(column: &ColumnName) -> Option<&str> {
     let second = parse("s").ok().map(|s| s.dimension);
     let of_time = |unit: &&str| parse(unit).ok().map(|u| u.dimension) == second;
     let unit = column.unit.as_deref().filter(of_time);
-    let alone = ["ms", "us", "µs", "ns"].contains(&column.text.as_str());
-    unit.or(alone.then_some(&column.text))
+    let lower = column.text.to_lowercase();
+    let word = || {
+        TIMES
+            .iter()
+            .find(|(word, _)| *word == lower)
+            .map(|(_, unit)| *unit)
+    };
+    let short = || {
+        ["ms", "us", "µs", "ns", "min"]
+            .into_iter()
+            .find(|unit| *unit == lower)
+    };
+    unit.or_else(word).or_else(short)
 }
 
 /// A name as ids are written: small letters, words joined by `_`.

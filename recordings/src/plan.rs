@@ -240,7 +240,13 @@ impl Finder<'_> {
         let split = header
             .filter(|h| h.text != signal.id)
             .and_then(|h| h.unit.as_deref());
-        let unit = wish.unit.or(ending).or(split);
+        // One that is nothing but a unit of the signal is in it: `RPM`.
+        let expected = parse(signal.unit).ok().map(|unit| unit.dimension);
+        let named = header.and_then(|header| {
+            let mut texts = [header.text.clone(), header.text.to_lowercase()].into_iter();
+            texts.find(|text| parse(text).is_ok_and(|unit| Some(unit.dimension) == expected))
+        });
+        let unit = wish.unit.or(ending).or(split).or(named.as_deref());
         let link = self.link(
             column,
             signal.id,

@@ -87,6 +87,8 @@ criteria! {
         shortest_s: f64 = 0.5 "s", Judgement: "most levels of an input last longer";
         /// Longest block.
         longest_s: f64 = 2.5 "s", Judgement: "longer blocks may hold out a whole level of an input, and then test extrapolation";
+        /// Least number of samples in a block, where a log is slow and its length allows it.
+        samples: usize = 25 "1", Judgement: "fewer are told by their neighbours; ten samples in a second have them in the longest block";
         /// Blocks that a run is divided into where their length allows.
         blocks: usize = 16 "1", Judgement: "four validation blocks in each run";
         /// One block in this many is held out.

@@ -139,6 +139,8 @@ mirror! {
         RestingStart,
         /// Voltages logged as magnitudes; their signs were reconstructed.
         UnsignedVoltage,
+        /// An angle that begins anew after each turn, or a counter that runs over; it was taken as going on.
+        Wrapped,
         /// A column that does not say its unit; SI was assumed.
         UnitAssumed,
         /// A file that ends too early; what is before the cut was read.

@@ -263,7 +263,7 @@ mod tests {
         );
         let said = help(
             "[log.inputs]\nvoltage = { column = \"volts\", scale = -1.0 }\n",
-            &rows("clock_s,volt_V,w_rpm\n"),
+            &rows("clock,volt_V,w_rpm\n"),
         );
         assert!(
             said.starts_with("this in the model file, in place of its [log]"),

@@ -469,3 +469,29 @@ fn an_optional_input_without_a_column_is_zero() {
     let with = with.trim_end_matches("7,");
     assert_eq!(read(with).runs[0].inputs()[1], 7.0);
 }
+
+#[test]
+fn a_header_that_is_a_unit_of_its_signal_gives_it() {
+    let speed = Measured {
+        column: Some("RPM".into()),
+        ..Measured::default()
+    };
+    let log_map = LogMap {
+        measured: BTreeMap::from([("speed".into(), speed)]),
+        ..LogMap::default()
+    };
+    let text = "minutes,V,RPM\n0,1,60\n1,2,30\n";
+    let voltage = BTreeMap::from([("voltage".into(), ColumnMap::Name("V".into()))]);
+    let recording = mapped(
+        text,
+        &LogMap {
+            inputs: voltage,
+            ..log_map
+        },
+    )
+    .unwrap();
+    let run = &recording.runs[0];
+    assert!((run.sample(0)[0] - std::f64::consts::TAU).abs() < 1e-12);
+    assert_eq!(run.time(), [0.0, 60.0]);
+    assert!(!kinds(&recording).contains(&FaultKind::UnitAssumed));
+}
