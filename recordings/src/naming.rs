@@ -64,7 +64,7 @@ fn time(text: &str) -> Option<(&str, &'static str)> {
     let name = name.trim_end_matches(['_', ' ', '-', '.']);
     match name.is_empty() {
         // `millis` alone is a time; `sec` is an effort somewhere, and `hours` may be those of a day.
-        true if word.len() > 4 && !["s", "min", "h"].contains(&unit) => Some((text, unit)),
+        true if word.len() > 4 && !["s", "min", "h"].contains(unit) => Some((text, unit)),
         false if apart || camel => Some((name, unit)),
         _ => None,
     }
