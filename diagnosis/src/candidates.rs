@@ -13,6 +13,7 @@ use crate::fitted::Fit;
 use crate::places::{channel_sets, has_another_name, unshown_part};
 use crate::positions::Positions;
 use crate::shows::can_show;
+use crate::sizes::powers;
 use crate::suited::{is_per_way, last_ends, last_rms, smooth, suit, widths};
 
 /// An effect at a set of channels.
@@ -68,17 +69,11 @@ impl Candidate {
 
     /// What a coefficient of `unit` is multiplied with in the recording; none where it is no coefficient of speeds and ways.
     fn way(&self, unit: &str) -> Option<f64> {
-        let ways = unit.strip_prefix("channel/")?.split('/');
-        ways.map(|factor| {
-            let (name, power) = factor.split_once('^').unwrap_or((factor, "1"));
-            let moved = match name {
-                "flow" => self.flow,
-                "position" => self.reach,
-                _ => return None,
-            };
-            Some(moved.powi(power.parse().ok()?))
-        })
-        .product()
+        let moved = |(role, power)| match role {
+            Role::Flow => self.flow.powi(power),
+            _ => self.reach.powi(power),
+        };
+        powers(unit)?.map(|way| way.map(moved)).product()
     }
 
     /// Parameters of the model that the candidate brought, by index.

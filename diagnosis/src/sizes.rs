@@ -42,19 +42,7 @@ pub(crate) fn sizes(model: &Model, runs: &[Run], deviations: &[f64]) -> Vec<f64>
 /// What a coefficient of `unit` is multiplied with: powers of the position and the speed at a channel, as far as they move in the
 /// recording. None where it is no such coefficient, or the signal is not measured.
 fn way(model: &Model, channel: &Channel, unit: &str, deviations: &[f64]) -> Option<f64> {
-    let mut per = unit.split('/');
-    if per.next() != Some("channel") {
-        return None;
-    }
-    let mut ways = per.filter_map(|factor| {
-        let (name, power) = factor.split_once('^').unwrap_or((factor, "1"));
-        let role = match name {
-            "position" => Role::Position,
-            "flow" => Role::Flow,
-            _ => return None,
-        };
-        Some((role, power.parse().ok()?))
-    });
+    let mut ways = powers(unit)?.flatten();
     let of = |(role, power): (Role, i32)| {
         let id = channel.read(role)?;
         let signal = model.measured.iter().position(|m| m.signal.id == id)?;
@@ -62,6 +50,21 @@ fn way(model: &Model, channel: &Channel, unit: &str, deviations: &[f64]) -> Opti
     };
     let first = of(ways.next()?)?;
     ways.try_fold(first, |product, next| Some(product * of(next)?))
+}
+
+/// The powers of positions and speeds that a coefficient of `unit` is multiplied with, and nothing for each other factor; none
+/// where it is no coefficient.
+pub(crate) fn powers(unit: &str) -> Option<impl Iterator<Item = Option<(Role, i32)>>> {
+    let factors = unit.strip_prefix("channel/")?.split('/');
+    Some(factors.map(|factor| {
+        let (name, power) = factor.split_once('^').unwrap_or((factor, "1"));
+        let role = match name {
+            "position" => Role::Position,
+            "flow" => Role::Flow,
+            _ => return None,
+        };
+        Some((role, power.parse().ok()?))
+    }))
 }
 
 #[cfg(test)]

@@ -140,11 +140,14 @@ pub(crate) fn is_time(name: &str) -> bool {
     name == "t" || TIME_NAMES.iter().any(|n| name.starts_with(n)) || alone()
 }
 
+/// Whether a unit is one of time.
+pub(crate) fn is_unit_of_time(unit: &str) -> bool {
+    parse("s").is_ok_and(|s| parse(unit).is_ok_and(|unit| unit.dimension == s.dimension))
+}
+
 /// The unit of a column of times, by its header: one that ends with a unit of time, or is nothing else.
 pub(crate) fn unit_of_time(column: &ColumnName) -> Option<&str> {
-    let second = parse("s").ok().map(|s| s.dimension);
-    let of_time = |unit: &&str| parse(unit).ok().map(|u| u.dimension) == second;
-    let unit = column.unit.as_deref().filter(of_time);
+    let unit = column.unit.as_deref().filter(|unit| is_unit_of_time(unit));
     let lower = column.text.to_lowercase();
     let word = || {
         TIMES

@@ -280,11 +280,9 @@ impl Finder<'_> {
         }
         let columns = &self.table.columns;
         let is_time = naming::is_time;
-        let second = parse("s").ok().map(|s| s.dimension);
-        let in_seconds = |unit: &str| parse(unit).ok().map(|u| u.dimension) == second;
-        let with_unit = columns
-            .iter()
-            .position(|c| is_time(&c.name) && c.unit.as_deref().is_some_and(in_seconds));
+        let with_unit = columns.iter().position(|c| {
+            is_time(&c.name) && c.unit.as_deref().is_some_and(naming::is_unit_of_time)
+        });
         let column = with_unit
             .or_else(|| {
                 columns
