@@ -117,6 +117,10 @@ impl EffectMeta {
     }
 }
 
+/// Time constant below which a lag is followed by its area alone, s, where nothing says that the samples are closer: integration
+/// steps of up to 10 ms can follow it.
+pub const SHORTEST_LAG_S: f64 = 0.004;
+
 /// What an effect sees at one of its channels at one instant.
 ///
 /// For an effect with memory the contribution is one that holds over `from..to`.
@@ -143,6 +147,8 @@ pub struct Reading<'a, S> {
     /// All signals of the plant: states, inputs, outputs. Those that nobody asked for may be of an
     /// earlier instant.
     pub signals: &'a [S],
+    /// Shortest time constant that the simulation follows, s: [`SHORTEST_LAG_S`], or less where its samples are closer.
+    pub shortest: f64,
     /// The channel's nominal value in the past, and in the future as far as [`EffectMeta::ahead_s`] says and it is known.
     pub past: &'a dyn Past<S>,
 }
@@ -160,6 +166,7 @@ impl<'a, S: Real> Reading<'a, S> {
             roles: [None; Role::COUNT],
             reads: None,
             signals: &[],
+            shortest: SHORTEST_LAG_S,
             past: &NoPast,
         }
     }

@@ -98,7 +98,7 @@ pub use driver::{Driver, DriverError, DriverFault, Sample};
 pub use dynamics::{Act, Dynamics, Steps, Under};
 #[doc(hidden)]
 pub use dynamics::{steps_alone, steps_of, steps_under};
-pub use effect::{Effect, EffectArrays, EffectMeta, NoPast, Past, Reading, Shows};
+pub use effect::{Effect, EffectArrays, EffectMeta, NoPast, Past, Reading, SHORTEST_LAG_S, Shows};
 pub use estimator::{Estimator, Innovation};
 pub use integrator::{Bend, Rk4, rk4_step, substeps};
 pub use limits::Limits;

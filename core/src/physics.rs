@@ -17,6 +17,8 @@ pub struct Spot {
     pub reads: [Option<usize>; Role::COUNT],
     /// Its states among [`Now::z`].
     pub z: Range<usize>,
+    /// See [`Reading::shortest`].
+    pub shortest: f64,
 }
 
 /// What effects are evaluated with at one instant.
@@ -60,6 +62,7 @@ pub trait Physics<S: Real>: Send + Sync {
                 roles: [None; Role::COUNT],
                 reads: Some(&spot.reads),
                 signals: now.signals,
+                shortest: spot.shortest,
                 past: &NoPast,
             };
             if let (false, Some(dz)) = (z.is_empty(), dz.get_mut(spot.z.clone())) {

@@ -228,14 +228,15 @@ impl Candidate {
         Some(without)
     }
 
-    /// `start` with a hundredth of the sizes of the effect: its linear parameters that are zero without it. None where
-    /// it has none, or they are nothing already.
+    /// `start` with a hundredth of the sizes of the effect: its linear parameters and times that are zero without it. None where
+    /// it has none, or they are nothing already. A lag of 20 ms is another machine where a swing takes 70 ms.
     pub(crate) fn faint(&self, start: &[f64]) -> Option<Vec<f64>> {
         let mut faint = start.to_vec();
         for i in self.own() {
             let parameter = &self.model.parameters[i];
             let declaration = parameter.declaration;
-            if parameter.free && declaration.linear && declaration.default == Some(0.0) {
+            let is_size = declaration.linear || parameter.is_time();
+            if parameter.free && is_size && declaration.default == Some(0.0) {
                 faint[i] *= 0.01;
             }
         }

@@ -91,7 +91,7 @@ pub enum FitError {
     },
     /// The plant offers no regression.
     #[error(
-        "the plant `{0}` declares no controlled states, so there is no regression for recursive least squares; use --method output-error"
+        "no parameter to estimate moves the rate of a state of the plant `{0}` that is controlled or measured, so there is no regression for recursive least squares; use --method output-error"
     )]
     NoRegression(String),
     /// The solver gave up.
@@ -120,7 +120,7 @@ impl From<CompareError> for FitError {
 impl From<RegressionError> for FitError {
     fn from(error: RegressionError) -> Self {
         match error {
-            RegressionError::NoControlledStates(plant) => FitError::NoRegression(plant),
+            RegressionError::NoRates(plant) => FitError::NoRegression(plant),
             RegressionError::NotLinear(parameter) => FitError::NotLinear { parameter },
             RegressionError::Unknown(parameter) => FitError::Unknown(vec![parameter]),
         }

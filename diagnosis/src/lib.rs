@@ -148,6 +148,7 @@ mod sufficiency;
 mod suited;
 #[cfg(test)]
 mod swing;
+mod telling;
 pub mod tracking;
 mod trial;
 mod unfold;

@@ -15,6 +15,7 @@ use serde::Serialize;
 use crate::floor;
 use crate::growth::{Growth, Linearised, Path, unstable};
 use crate::progress::{Cancelled, Work};
+use crate::telling::attach_telling;
 
 /// How an observer corrected a free run by the measurements, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -78,7 +79,7 @@ fn seconds(value: f64) -> String {
 /// Samples of one run over which the growth of errors is followed.
 const LOOKED_AT: usize = 20_000;
 /// Shortest horizon, and that of the first look, in sampling periods.
-const SHORTEST: f64 = 10.0;
+pub(crate) const SHORTEST: f64 = 10.0;
 const FIRST: f64 = 20.0;
 /// Noise is taken to be at least this share of a signal's standard deviation.
 const LEAST_NOISE: f64 = 1e-4;
@@ -93,7 +94,10 @@ pub(crate) fn attach_observer<'r>(
     work: &Work<'_>,
 ) -> Result<Cow<'r, [Run]>, Cancelled> {
     match growth(model, values, runs, work)? {
-        Some(growth) => attach_observer_for(model, values, runs, &growth, work),
+        Some(growth) => {
+            let values = values.to_vec();
+            Ok(attach_telling(model, values, runs, &growth, None, work)?.0)
+        }
         None => Ok(Cow::Borrowed(runs)),
     }
 }

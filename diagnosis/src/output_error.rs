@@ -19,6 +19,7 @@ use crate::progress::{Cancelled, Work};
 use crate::regression::batch;
 use crate::settings::{FitSettings, Method};
 use crate::solve::Effort;
+use crate::telling::attach_telling;
 use crate::unshown::tied;
 
 /// Fits the free parameters and the initial states of all runs.
@@ -162,7 +163,7 @@ pub(crate) fn prepare<'a>(
         // The observer stays, even if errors no longer grow with it: without it they would again.
         growth = self::growth(model, &values, runs, work)?.unwrap_or(growth);
     }
-    prepared.runs = attach_observer_for(model, &values, runs, &growth, work)?;
+    (prepared.runs, values) = attach_telling(&present, values, runs, &growth, Some(ROUND), work)?;
     present.set_values(&values);
     prepared.model = Cow::Owned(present);
     Ok(prepared)

@@ -64,8 +64,8 @@ pub(crate) fn for_each_row(
 
 /// Ordinary least squares over all samples: a starting point for a fit that needs one.
 ///
-/// Parameters that are free but enter non-linearly keep the model's value, or have the typical size of their
-/// declaration. Values that the samples do not determine are those of least norm. For `span` see
+/// Parameters that are free but enter non-linearly, and those that move the rate of no state that is measured, keep the model's
+/// value, or have the typical size of their declaration. Values that the samples do not determine are those of least norm. For `span` see
 /// [`for_each_row`]. What differs from run to run has one value for all of them.
 pub(crate) fn batch(
     model: &Model,
@@ -106,10 +106,11 @@ pub(crate) fn batch(
             }
         },
     )?;
-    let mut values: Vec<f64> = linear
-        .parameters
-        .iter()
-        .map(|p| p.value.unwrap_or(0.0))
+    let mut values: Vec<f64> = (linear.parameters.iter().zip(0..))
+        .map(|(p, index)| {
+            let known = p.value.or(linear.tie(index).map(|_| 0.0));
+            known.unwrap_or_else(|| p.declaration.nearest(p.scale()))
+        })
         .collect();
     // A parameter that is tied to another one's row is in both. The row that determines it better counts.
     let mut told = vec![0.0; values.len()];

@@ -2,17 +2,15 @@
 
 use std::borrow::Cow;
 
-use loopsight_model::model::{Model, pseudo_inverse};
+use loopsight_model::model::Model;
+use loopsight_model::regression::told;
 use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
 
-/// Share of a state that sensors must tell of it.
-const TOLD: f64 = 0.999;
-
 /// What a regression reads of a log.
 ///
-/// Its left-hand side is the change of the controlled states, which are speeds. Where a log has angles alone, those speeds are
-/// differences over the time between two samples, that is means over it; so everything else is a mean over that time, too:
+/// Its left-hand side is the change of states, which are mostly speeds. Where a log has an angle and not its speed, those speeds
+/// are differences over the time between two samples, that is means over it; so everything else is a mean over that time, too:
 ///
 /// ```text
 /// ω̄_k = (φ_k - φ_l)/(t_k - t_l)        φ̄_k = ∫ φ dt / (t_k - t_l)
@@ -34,13 +32,17 @@ enum Value {
 }
 
 impl<'m> Speeds<'m> {
-    /// Of the log of a `model`; what is measured, where that tells the controlled states.
+    /// Of the log of a `model`; what is measured, where that tells the controlled states and the speed of each angle.
     pub(crate) fn of(model: &'m Model) -> Self {
         let as_measured = || Self {
             model: Cow::Borrowed(model),
             values: (0..model.measured.len()).map(Value::Sample).collect(),
         };
-        if tells_speeds(model) {
+        let told = told(model);
+        let rates = model.plant.integrals.iter();
+        let rates = rates.filter_map(|(rate, _)| model.find_signal(rate).ok());
+        let mut needed = rates.chain(model.plant.controlled.iter().copied());
+        if needed.all(|signal| told.get(signal).is_none_or(|told| *told)) {
             return as_measured();
         }
         Self::differences(model).unwrap_or_else(as_measured)
@@ -108,20 +110,4 @@ impl<'m> Speeds<'m> {
             }
         }));
     }
-}
-
-/// Whether the measured signals tell each controlled state.
-fn tells_speeds(model: &Model) -> bool {
-    let values: Vec<f64> = (model.parameters.iter())
-        .map(|p| p.value.unwrap_or(0.0))
-        .collect();
-    let (jacobian, _) = model.measurement_jacobian(&values, &vec![0.0; model.n_states()]);
-    let Some(inverse) = pseudo_inverse(&jacobian) else {
-        return true;
-    };
-    let told = inverse * jacobian;
-    let controlled = model.plant.controlled.iter();
-    controlled
-        .map(|state| told[(*state, *state)])
-        .all(|share| share >= TOLD)
 }

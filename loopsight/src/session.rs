@@ -276,6 +276,8 @@ fn matched(model: &mut Composed, log: &Log) -> Result<(Vec<Run>, Vec<Fault>)> {
             None => message,
         })
     })?;
+    let periods = recording.runs.iter().map(Run::median_period);
+    model.follow(periods.fold(f64::INFINITY, f64::min));
     stamps::check(model, log, &recording)?;
     bounded::log(&log.name, model, &recording.runs)?;
     Ok((recording.runs, recording.faults))

@@ -12,7 +12,7 @@ mod ties;
 
 use std::path::Path;
 
-use loopsight_core::{Derived, Parameter, Place, PlantMeta, Reading, Role};
+use loopsight_core::{Derived, Parameter, Place, PlantMeta, Reading, Role, SHORTEST_LAG_S};
 
 use crate::attach::{attach, make_names_unique};
 pub use crate::attach::{fitting_channels, misfit, unit_at};
@@ -56,6 +56,8 @@ pub struct Model {
     /// Steps may be longer than [`Model::max_step`], up to the time between samples, where the motion allows it: for a
     /// search, which ends with the usual ones. Nothing where the file gives the step.
     pub by_motion: bool,
+    /// Shortest time constant that a simulation follows, s, see [`Model::follow`].
+    pub shortest_lag: f64,
     pub(crate) dynamics: &'static dyn AnyDynamics,
     pub(crate) set: usize,
     pub(crate) n_plant_parameters: usize,
@@ -178,6 +180,7 @@ impl Model {
             max_step: step,
             step_given: file.simulation.max_step_s.is_some(),
             by_motion: false,
+            shortest_lag: SHORTEST_LAG_S,
             dynamics: ready.dynamics,
             set: values.set,
             n_plant_parameters,
@@ -362,6 +365,14 @@ impl Model {
         Self {
             by_motion: true,
             ..self
+        }
+    }
+
+    /// Follows lags down to the `period` between samples, s, where that is shorter than [`SHORTEST_LAG_S`]: no step is longer
+    /// than it. Of a shorter one the area after a step is right, and hardly anything else would show in such a log.
+    pub fn follow(&mut self, period: f64) {
+        if period > 0.0 {
+            self.shortest_lag = period.min(SHORTEST_LAG_S);
         }
     }
 

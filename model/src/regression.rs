@@ -32,9 +32,12 @@ pub enum Scheme {
 /// Why a model offers no regression.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RegressionError {
-    /// The plant declares no controlled states.
-    #[error("the plant `{0}` declares no controlled states, so its equations give no regression")]
-    NoControlledStates(String),
+    /// No parameter to estimate moves the rate of a controlled state, or of one that is measured.
+    #[error(
+        "no parameter to estimate moves the rate of a state of the plant `{0}` that is controlled or measured, so its \
+         equations give no regression"
+    )]
+    NoRates(String),
     /// A free parameter enters non-linearly.
     #[error("`{0}` enters the equations non-linearly, so a linear regression cannot estimate it")]
     NotLinear(String),
@@ -43,7 +46,11 @@ pub enum RegressionError {
     Unknown(String),
 }
 
-/// One scalar regression `y = φ · θ` per controlled state, fed sample by sample.
+/// Share of a state that sensors must tell of it.
+const TOLD: f64 = 0.999;
+
+/// One scalar regression `y = φ · θ` per state, fed sample by sample: of the controlled states, and where it is made for a
+/// fit, of every other state that sensors tell, too.
 ///
 /// The regressors come from the plant's own equations: `φ_j` is the change of the state's rate when
 /// parameter `j` alone is one, so estimators, fits and the plant cannot disagree. Nothing is
@@ -97,18 +104,42 @@ struct Row {
     y: f64,
 }
 
+/// Whether the measured signals tell each state.
+pub fn told(model: &Model) -> Vec<bool> {
+    let values: Vec<f64> = (model.parameters.iter())
+        .map(|p| p.value.unwrap_or(0.0))
+        .collect();
+    let (jacobian, _) = model.measurement_jacobian(&values, &vec![0.0; model.n_states()]);
+    let Some(inverse) = pseudo_inverse(&jacobian) else {
+        return vec![true; model.n_states()];
+    };
+    let told = inverse * jacobian;
+    told.diagonal().iter().map(|share| *share >= TOLD).collect()
+}
+
 impl Regression {
-    /// The regressions of `model` in its free parameters.
+    /// The regressions of `model` in its free parameters: of its controlled states, and of those others that sensors tell and
+    /// whose rates a free parameter moves, such as the speed of a load behind a spring.
     ///
     /// # Errors
     ///
-    /// [`RegressionError`] where the plant has no controlled states, or a free parameter enters non-linearly.
+    /// [`RegressionError`] where there is no such state, or a free parameter enters non-linearly.
     pub fn new(model: &Model, scheme: Scheme) -> Result<Self, RegressionError> {
-        if model.plant.controlled.is_empty() {
-            return Err(RegressionError::NoControlledStates(
-                model.plant.id.to_owned(),
-            ));
+        let mut regression = Self::without_rows(model, scheme)?;
+        let controlled = model.plant.controlled;
+        regression.find_rows(controlled.iter().copied());
+        let told = told(model);
+        let others = (0..told.len()).filter(|i| told[*i] && !controlled.contains(i));
+        regression.find_rows(others);
+        let moved = |row: &Row| !row.parameters.is_empty();
+        (regression.rows).retain(|row| moved(row) || controlled.contains(&row.state));
+        if regression.rows.is_empty() {
+            return Err(RegressionError::NoRates(model.plant.id.to_owned()));
         }
+        Ok(regression)
+    }
+
+    fn without_rows(model: &Model, scheme: Scheme) -> Result<Self, RegressionError> {
         let mut base = Vec::new();
         for (index, parameter) in model.parameters.iter().enumerate() {
             base.push(match (parameter.free, parameter.value) {
@@ -126,7 +157,7 @@ impl Regression {
         let (jacobian, offset) = model.measurement_jacobian(&base, &vec![0.0; nx]);
         let to_state =
             pseudo_inverse(&jacobian).unwrap_or_else(|| DMatrix::zeros(nx, offset.len()));
-        let mut regression = Self {
+        Ok(Self {
             scheme,
             rows: Vec::new(),
             means: model.measured.iter().any(|m| m.sensor.is_mean()),
@@ -147,12 +178,10 @@ impl Regression {
             base,
             model: model.clone(),
             acting: None,
-        };
-        regression.find_rows();
-        Ok(regression)
+        })
     }
 
-    /// The regressions of `model` with its effects, in those free parameters that enter linearly; the
+    /// The regressions of the controlled states of `model` with its effects, in those free parameters that enter linearly; the
     /// others keep their values. `period` (s) is that of the loop. Where nothing acts between command
     /// and rate it is that of [`Regression::new`].
     ///
@@ -169,13 +198,15 @@ impl Regression {
         for parameter in &mut linear.parameters {
             parameter.free &= parameter.declaration.linear || parameter.value.is_none();
         }
-        let mut regression = Self::new(&linear, scheme)?;
+        if model.plant.controlled.is_empty() {
+            return Err(RegressionError::NoRates(model.plant.id.to_owned()));
+        }
+        let mut regression = Self::without_rows(&linear, scheme)?;
         let values: Vec<f64> = (linear.parameters.iter())
             .map(|p| p.value.unwrap_or(0.0))
             .collect();
         regression.acting = Acting::new(&linear, &values, period);
-        regression.rows.clear();
-        regression.find_rows();
+        regression.find_rows(model.plant.controlled.iter().copied());
         Ok(regression)
     }
 
@@ -216,9 +247,9 @@ impl Regression {
 
     /// A parameter belongs to a row when it moves that state's rate anywhere: tried at a few
     /// points without symmetry.
-    fn find_rows(&mut self) {
+    fn find_rows(&mut self, states: impl Iterator<Item = usize>) {
         let nx = self.model.n_states();
-        for &state in self.model.plant.controlled {
+        for state in states {
             let mut parameters = Vec::new();
             for (j, parameter) in self.model.parameters.clone().iter().enumerate() {
                 let moves = parameter.free

@@ -16,6 +16,7 @@ use loopsight_model::log_map::{Column, ColumnMap, LogMap};
 use crate::derive;
 use crate::error::RecordingError;
 use crate::names::nearest;
+use crate::naming;
 use crate::table::{ColumnName, TIME, Table, TableRun};
 
 /// What WPILib calls the state of a mechanism that is not being tested.
@@ -265,11 +266,12 @@ pub(crate) fn last(path: &str) -> &str {
 fn header(channel: &Channel) -> ColumnName {
     let (name, ending) = split_name(last(&channel.info.path));
     let declared = channel.info.unit.as_deref();
-    let unit = declared.filter(|unit| parse(unit).is_ok()).or(ending);
+    let declared = declared.filter(|unit| parse(unit).is_ok());
+    let ending = ending.map(naming::ending);
     ColumnName {
         text: channel.info.path.clone(),
         name: name.to_owned(),
-        unit: unit.map(str::to_owned),
+        unit: declared.map(str::to_owned).or(ending),
     }
 }
 

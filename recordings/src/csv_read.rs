@@ -22,7 +22,7 @@ use crate::dialect::{self, delimiter, number};
 use crate::error::RecordingError;
 use crate::naming::{is_time, unit_of_time};
 use crate::source::as_text;
-use crate::stamp::nanoseconds;
+use crate::stamp::Instant;
 use crate::table::{ColumnName, Table, TableRun};
 
 /// Reads CSV from anywhere; `source_name` is what errors call it.
@@ -59,8 +59,8 @@ struct Rows<'l> {
     delimiter: u8,
     columns: Vec<ColumnName>,
     labels: BTreeMap<usize, Vec<String>>,
-    /// Columns of dates and times, and the first of each, ns.
-    origins: BTreeMap<usize, i64>,
+    /// Columns of dates and times, the first of each, and the last one in seconds since then.
+    origins: BTreeMap<usize, (Instant, f64)>,
     run: TableRun,
     lines: RowLines,
     /// There is a header.
@@ -229,26 +229,27 @@ impl<'l> Rows<'l> {
         if let Some(words) = self.labels.get_mut(&at) {
             return Ok(index_of(words, field));
         }
-        if let Some(origin) = self.origins.get(&at) {
+        if let Some((origin, last)) = self.origins.get_mut(&at) {
             if field.is_empty() {
                 return Ok(f64::NAN);
             }
-            let since = |now: i64| Some(now.checked_sub(*origin)? as f64 / 1e9);
-            return nanoseconds(field)
-                .and_then(since)
-                .ok_or_else(|| RecordingError::NotATime {
-                    log: self.log.into(),
-                    line,
-                    column: at + 1,
-                    name: self.name(at).into(),
-                    text: field.into(),
-                });
+            if let Some(now) = Instant::of(field).and_then(|now| now.since(*origin, *last)) {
+                *last = now;
+                return Ok(now);
+            }
+            return Err(RecordingError::NotATime {
+                log: self.log.into(),
+                line,
+                column: at + 1,
+                name: self.name(at).into(),
+                text: field.into(),
+            });
         }
         if let Some(value) = number(field, self.delimiter) {
             return Ok(value);
         }
-        if let Some(origin) = nanoseconds(field).filter(|_| first) {
-            self.origins.insert(at, origin);
+        if let Some(origin) = Instant::of(field).filter(|_| first) {
+            self.origins.insert(at, (origin, 0.0));
             if let Some(column) = self.columns.get_mut(at) {
                 column.unit = Some("s".to_owned());
             }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::naming;
-use crate::stamp::nanoseconds;
+use crate::stamp::Instant;
 
 /// Lines that decide.
 const LOOKED_AT: usize = 5;
@@ -115,7 +115,7 @@ pub(crate) fn is_data(record: &csv::StringRecord, delimiter: u8) -> bool {
     let any = record
         .iter()
         .any(|field| value(field).is_some_and(|v| !v.is_nan()));
-    let fits = |field: &str| value(field).is_some() || nanoseconds(field).is_some();
+    let fits = |field: &str| value(field).is_some() || Instant::of(field).is_some();
     any && record.iter().all(fits)
 }
 

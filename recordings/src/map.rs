@@ -159,6 +159,8 @@ struct Mapper<'a> {
     duplicates: Tally,
     backwards: Tally,
     restarts: Tally,
+    /// How often a counter of time ran over.
+    wrapped: usize,
     gaps: Tally,
     longest_gap: f64,
     missing: Vec<Tally>,
@@ -179,6 +181,7 @@ impl<'a> Mapper<'a> {
             duplicates: Tally::default(),
             backwards: Tally::default(),
             restarts: Tally::default(),
+            wrapped: 0,
             gaps: Tally::default(),
             longest_gap: 0.0,
             missing: tallies(),
@@ -236,8 +239,9 @@ impl<'a> Mapper<'a> {
         let first_row = range.start;
         let origin = rows.row(first_row)[time.column];
         let mut times = Vec::with_capacity(range.len());
-        for at in range.clone() {
-            let stamp = rows.row(at)[time.column];
+        let mut stamps: Vec<f64> = range.clone().map(|at| rows.row(at)[time.column]).collect();
+        self.wrapped += turns::run_on(&mut stamps);
+        for (at, stamp) in range.clone().zip(stamps) {
             self.check(run, at, time, stamp, "the time")?;
             self.seconds(run, at, stamp * time.factor)?;
             let shifted = self.exact((stamp - origin) * time.factor);
@@ -420,6 +424,13 @@ impl<'a> Mapper<'a> {
                 time,
                 said.join("; "),
             );
+        }
+        if self.wrapped > 0 {
+            let detail = format!(
+                "it begins anew {} times, as a counter of 16 or 32 bits does that runs over; it is taken as going on",
+                self.wrapped
+            );
+            push(FaultKind::Wrapped, String::new(), time, detail);
         }
         if self.gaps.count > 0 {
             let detail = format!(

@@ -94,7 +94,7 @@ pub(crate) fn split(text: &str) -> (&str, Option<String>) {
         return (name, Some(unit));
     }
     if let (name, Some(unit)) = split_name(text) {
-        return (name, Some(unit.to_owned()));
+        return (name, Some(ending(unit)));
     }
     if let Some((name, unit)) = time(text) {
         return (name, Some(unit.to_owned()));
@@ -112,6 +112,24 @@ pub(crate) fn split(text: &str) -> (&str, Option<String>) {
         }
     }
     (text, None)
+}
+
+/// The unit that the end of a name means: `m_per_s` where it is `m_s`, and `rad_per_s2` where it is `rad_s2`. A way or an angle
+/// times a time is measured by nobody.
+pub(crate) fn ending(unit: &str) -> String {
+    let whose = |text: &str, base: &str| {
+        parse(base).is_ok_and(|base| parse(text).is_ok_and(|unit| unit.dimension == base.dimension))
+    };
+    match unit.rsplit_once('_') {
+        Some((way, time))
+            if !way.contains('_')
+                && (whose(way, "m") || whose(way, "rad"))
+                && (whose(time, "s") || whose(time, "s2")) =>
+        {
+            format!("{way}_per_{time}")
+        }
+        _ => unit.to_owned(),
+    }
 }
 
 /// `Speed (RPM)`: the name, and the unit in brackets, in small letters where it is none otherwise.
@@ -196,6 +214,11 @@ mod tests {
             ("timestamp_usec", "timestamp", Some("us")),
             ("millis", "millis", Some("ms")),
             ("elapsed_sec", "elapsed", Some("s")),
+            ("climb_m_s", "climb", Some("m_per_s")),
+            ("gyro_z_deg_s", "gyro_z", Some("deg_per_s")),
+            ("acc_m_s2", "acc", Some("m_per_s2")),
+            ("torque_N_m", "torque", Some("N_m")),
+            ("flux_V_s", "flux", Some("V_s")),
             ("parsec", "parsec", None),
             ("omega", "omega", None),
             ("(V)", "(V)", None),

@@ -173,7 +173,8 @@ pub(crate) fn find<'t>(table: &'t Table, name: &str) -> Option<(usize, Option<&'
     let columns = || table.columns.iter().enumerate();
     let ending = columns().find_map(|(at, column)| {
         let unit = column.text.strip_prefix(name)?.strip_prefix('_')?;
-        naming::is_unit(unit).then_some((at, Some(unit)))
+        let split = column.unit.as_deref().filter(|_| column.name == name);
+        naming::is_unit(unit).then_some((at, split.or(Some(unit))))
     });
     let named = || {
         let fits = |(_, c): &(usize, &ColumnName)| c.unit.is_some() && c.name == name;

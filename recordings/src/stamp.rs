@@ -1,25 +1,73 @@
 //! Dates and times as they stand in logs: ISO 8601, and what spreadsheets make of it.
 //!
 //! `2024-05-01T12:00:00.125Z`, `2024-05-01 12:00:00,125+02:00`, `12:00:00.5`. The date may have slashes
-//! (`2024/05/01`); a time without a zone is taken as it is.
+//! (`2024/05/01`), begin with its day (`01.05.2024`) or its month (`5/1/2024 1:30 PM`), or name the month (`01-May-2024`); a time
+//! without a zone is taken as it is.
 //!
 //! Reference: ISO 8601-1:2019; days from H. Hinnant, "chrono-Compatible Low-Level Date Algorithms", 2021.
 
 const DAY: i64 = 86_400;
 const NANO: i64 = 1_000_000_000;
 
-/// Nanoseconds since 1970, or since midnight where there is no date; none for anything else.
-pub(crate) fn nanoseconds(text: &str) -> Option<i64> {
+/// Orders of the parts of a date that ends with its year.
+#[derive(Clone, Copy)]
+enum Order {
+    DayFirst,
+    MonthFirst,
+}
+
+/// What a date and time may be, in nanoseconds since 1970, or since midnight where there is no date: with its day before its
+/// month, and with its month before its day. Nearly all have one order, and are the same twice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Instant([Option<i64>; 2]);
+
+impl Instant {
+    /// None of what is no time.
+    pub(crate) fn of(text: &str) -> Option<Self> {
+        let instant = [Order::DayFirst, Order::MonthFirst].map(|order| nanoseconds(text, order));
+        instant.iter().any(Option::is_some).then_some(Self(instant))
+    }
+
+    /// Seconds since an `origin`, both read in the same order: in that which comes nearest to what was `last`.
+    pub(crate) fn since(self, origin: Self, last: f64) -> Option<f64> {
+        let pairs = self.0.into_iter().zip(origin.0);
+        let spans = pairs.filter_map(|(now, origin)| now?.checked_sub(origin?));
+        let seconds = spans.map(|span| span as f64 / 1e9);
+        seconds.min_by(|a, b| (a - last).abs().total_cmp(&(b - last).abs()))
+    }
+}
+
+fn nanoseconds(text: &str, order: Order) -> Option<i64> {
     let text = text.trim();
     let (date, time) = match text.split_once(['T', 't', ' ']) {
-        Some((date, time)) => (Some(date), time.trim_start()),
-        None => (None, text),
+        Some((date, time)) if !date.contains(':') => (Some(date), time.trim_start()),
+        _ => (None, text),
     };
-    let days = date.map_or(Some(0), days)?;
+    let days = date.map_or(Some(0), |date| days(date, order))?;
+    let (time, afternoon) = half_of_day(time);
     let (clock, shift) = zone(time)?;
-    let (seconds, nano) = of_clock(clock)?;
+    let (mut seconds, nano) = of_clock(clock)?;
+    if let Some(afternoon) = afternoon {
+        let hour = 3600;
+        if !(hour..13 * hour).contains(&seconds) {
+            return None;
+        }
+        seconds = seconds % (12 * hour) + if afternoon { 12 * hour } else { 0 };
+    }
     let seconds = days.checked_mul(DAY)?.checked_add(seconds - shift)?;
     seconds.checked_mul(NANO)?.checked_add(nano)
+}
+
+/// A time without `AM` or `PM` behind it, and whether it is one of the afternoon where that is said.
+fn half_of_day(text: &str) -> (&str, Option<bool>) {
+    let at = text.len().saturating_sub(2);
+    let (time, half) = text.split_at_checked(at).unwrap_or((text, ""));
+    let afternoon = match half.to_ascii_lowercase().as_str() {
+        "am" => false,
+        "pm" => true,
+        _ => return (text, None),
+    };
+    (time.trim_end(), Some(afternoon))
 }
 
 /// A number of so many digits and nothing else.
@@ -28,15 +76,40 @@ fn digits(text: &str, lengths: std::ops::RangeInclusive<usize>) -> Option<i64> {
     right.then(|| text.parse().ok()).flatten()
 }
 
-/// Days since 1970 of `2024-05-01`.
-fn days(text: &str) -> Option<i64> {
-    let mut parts = text.split(['-', '/']);
-    let year = digits(parts.next()?, 4..=4)?;
-    let month = digits(parts.next()?, 1..=2).filter(|m| (1..=12).contains(m))?;
-    let day = digits(parts.next()?, 1..=2).filter(|d| (1..=31).contains(d))?;
-    if parts.next().is_some() {
-        return None;
+const MONTHS: [&str; 12] = [
+    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
+];
+
+/// The month that a number or the beginning of a name means.
+fn month(text: &str) -> Option<i64> {
+    let lower = text.to_ascii_lowercase();
+    match MONTHS.iter().zip(1..).find(|(name, _)| **name == lower) {
+        Some((_, month)) => Some(month),
+        None => digits(text, 1..=2).filter(|m| (1..=12).contains(m)),
     }
+}
+
+/// Days since 1970 of `2024-05-01`, or of a date that ends with its year, in an `order` where neither points nor a name say it.
+fn days(text: &str, order: Order) -> Option<i64> {
+    let mut parts = text.split(['-', '/', '.']);
+    let parts = [
+        parts.next()?,
+        parts.next()?,
+        parts.next()?,
+        parts.next().unwrap_or(""),
+    ];
+    let [first, second, third, ""] = parts else {
+        return None;
+    };
+    let named = second.starts_with(|c: char| c.is_ascii_alphabetic());
+    let (year, month_text, day) = match order {
+        _ if first.len() == 4 => (first, second, third),
+        Order::MonthFirst if !named && !text.contains('.') => (third, first, second),
+        _ => (third, second, first),
+    };
+    let year = digits(year, 4..=4)?;
+    let month = month(month_text)?;
+    let day = digits(day, 1..=2).filter(|d| (1..=31).contains(d))?;
     // The year begins in March: the leap day is its last.
     let year = year - i64::from(month <= 2);
     let era = year.div_euclid(400);
@@ -113,8 +186,13 @@ mod tests {
             ("2000-02-29T00:00:00", 951_782_400_000_000_000),
             ("12:00:00.5", 43_200_500_000_000),
             ("0:00:01.0000000019", 1_000_000_001),
+            ("01.05.2024 12:00:00,125", 1_714_564_800_125_000_000),
+            ("01-May-2024 12:00:00.125", 1_714_564_800_125_000_000),
+            ("12:00:00.5 AM", 500_000_000),
+            ("1:30 pm", 48_600_000_000_000),
         ] {
-            assert_eq!(nanoseconds(text), Some(expected), "{text}");
+            let both = Instant([Some(expected); 2]);
+            assert_eq!(Instant::of(text), Some(both), "{text}");
         }
         for text in [
             "",
@@ -125,15 +203,35 @@ mod tests {
             "2024-13-01T00:00:00",
             "1:2",
             "::",
+            "13:00 PM",
+            "0:30 AM",
+            "1.5.24 12:00",
+            "13/13/2024 12:00",
+            "01-Mai-2024 12:00",
         ] {
-            assert_eq!(nanoseconds(text), None, "{text}");
+            assert_eq!(Instant::of(text), None, "{text}");
         }
+    }
+
+    /// The third of April and the fourth of March are told apart by the next day.
+    #[test]
+    fn the_order_of_a_date_is_that_in_which_the_time_goes_on() {
+        let since = |first: &str, now: &str| {
+            let origin = Instant::of(first).unwrap();
+            Instant::of(now).and_then(|now| now.since(origin, 86_399.0))
+        };
+        let day = Some(86_400.0);
+        assert_eq!(since("03/04/2026 0:00", "03/05/2026 0:00"), day);
+        assert_eq!(since("03/04/2026 0:00", "04/04/2026 0:00"), day);
+        assert_eq!(since("12/31/2025 0:00", "1/1/2026 0:00"), day);
+        assert_eq!(since("31/12/2025 0:00", "1/1/2026 0:00"), day);
+        assert_eq!(since("12/31/2025 0:00", "13/1/2026 0:00"), None);
     }
 
     proptest! {
         #[test]
-        fn never_panics(any in ".{0,30}", near in "[0-9TZ:+ .,/-]{0,30}") {
-            let _ = (nanoseconds(&any), nanoseconds(&near));
+        fn never_panics(any in ".{0,30}", near in "[0-9TZ:+ .,/APM-]{0,30}") {
+            let _ = (Instant::of(&any), Instant::of(&near));
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Machines of which a counted angle alone is logged, that wander by many turns: what is missing is a small share of the angle's
-//! standard deviation.
+//! Machines of which angles alone are logged, that wander by many turns: what is missing is a small share of the angle's standard
+//! deviation.
 
 #![allow(
     clippy::unwrap_used,
@@ -105,6 +105,49 @@ fn an_arm_that_goes_over_the_top_has_friction_and_is_read_late() {
         ),
         ("lateness", late, LATE),
     ] {
+        assert!((found / truth - 1.0).abs() < 0.05, "{name}: {found}");
+    }
+}
+
+/// Two masses and a spring: what the load does is measured as well as what the motor does, and a regression reads both.
+#[test]
+fn recursive_least_squares_finds_a_load_behind_a_spring_by_its_angle() {
+    const INERTIA: [f64; 2] = [0.004, 0.02];
+    const SPRING: f64 = 12.0;
+    const DAMPING: [f64; 2] = [0.01, 0.005];
+    let mut random = Random::new(3);
+    let (mut angle, mut speed, mut torque, mut until) = ([0.0f64; 2], [0.0f64; 2], 0.0, 0);
+    let mut log = "time_s,torque_Nm,motor_angle_rad,load_angle_rad\n".to_owned();
+    for k in 0..(20.0 / STEP) as usize {
+        if k == until {
+            torque = 1.8 * random.share() - 0.9;
+            until = k + 100 * (3 + random.below(57));
+        }
+        if k % 20 == 0 {
+            let seen = angle.map(|angle| angle + 2e-4 * (random.share() - 0.5));
+            let time = k as f64 * STEP;
+            writeln!(log, "{time:.3},{torque:.4},{:.5},{:.5}", seen[0], seen[1]).unwrap();
+        }
+        let twist = SPRING * (angle[0] - angle[1]);
+        speed[0] += STEP * (torque - DAMPING[0] * speed[0] - twist) / INERTIA[0];
+        speed[1] += STEP * (twist - DAMPING[1] * speed[1]) / INERTIA[1];
+        angle[0] += STEP * speed[0];
+        angle[1] += STEP * speed[1];
+    }
+    let text = "[plant.flexible_joint]\nspring_time = 0.0\n\n[fit]\nfixed = [\"spring_time\"]\n\n\
+                [log.measured.motor_angle]\n[log.measured.load_angle]\n";
+    let model = Model::from_toml("joint.toml", text).unwrap();
+    let log = Log::from_bytes("joint.csv", log.as_bytes()).unwrap();
+    let mut options = FitOptions::default();
+    options.method = Method::Rls;
+    let answer = Session::new(model, log).unwrap().fit(&options).unwrap();
+    let answer = json(answer.to_json().unwrap());
+    for (name, truth) in [
+        ("drive", 1.0 / INERTIA[0]),
+        ("motor_stiffness", SPRING / INERTIA[0]),
+        ("load_stiffness", SPRING / INERTIA[1]),
+    ] {
+        let found = answer["parameters"][name]["value"].as_f64().unwrap();
         assert!((found / truth - 1.0).abs() < 0.05, "{name}: {found}");
     }
 }

@@ -17,6 +17,8 @@ pub(crate) struct Bound {
     pub(crate) place: Place,
     side: f64,
     is_position: bool,
+    /// See [`Reading::shortest`].
+    shortest: f64,
     /// The signals that play roles at its channel.
     reads: [Option<usize>; Role::COUNT],
     /// Signals it reads beside those.
@@ -99,6 +101,7 @@ impl Bounds {
                     side: f64::from(channel.side),
                     is_position: matches!(channel.place, Place::Output(i)
                         if reads_position(model, channel) == Some(i)),
+                    shortest: model.shortest_lag,
                     reads: *reads,
                     signals: effect.signals.clone(),
                     z: plant_states + bounds.states,
@@ -173,6 +176,7 @@ impl Group {
                 is_position: bound.is_position,
                 reads: bound.reads,
                 z: bound.z - first..bound.z - first + bound.n_z,
+                shortest: bound.shortest,
             };
             Some(Self {
                 physics: effect.physics,
@@ -233,6 +237,7 @@ impl<S: HostReal> Scene<'_, S> {
             roles: [None; Role::COUNT],
             reads: Some(&bound.reads),
             signals: self.signals,
+            shortest: bound.shortest,
             past,
         }
     }

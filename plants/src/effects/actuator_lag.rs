@@ -8,7 +8,7 @@ use super::first_order;
 /// Actuator lag: the command takes effect gradually.
 ///
 /// ```text
-/// z' = (u - z)/max(lag, T₀)          u_effective = u + (z - u) · lag/max(lag, T₀)          T₀ = 4 ms
+/// z' = (u - z)/max(lag, T₀)          u_effective = u + (z - u) · lag/max(lag, T₀)
 /// ```
 ///
 /// | symbol | what | unit |
@@ -16,8 +16,8 @@ use super::first_order;
 /// | `u` | the command | that of the channel |
 /// | `lag` | time constant | s |
 ///
-/// A first-order lag from 4 ms upwards. Below that its time constant stays at 4 ms, which
-/// integration steps of up to 10 ms can follow, and only the share `lag/T₀` of it is used: the
+/// `T₀` is 4 ms, which integration steps of up to 10 ms can follow, or the time between samples where that is shorter.
+/// Below it the time constant stays at `T₀`, and only the share `lag/T₀` of it is used: the
 /// area that is missing after a step is that of the lag in any case, and a lag of zero changes
 /// nothing.
 ///
@@ -51,11 +51,11 @@ impl Effect for ActuatorLag {
     };
 
     fn contribution<S: Real>(at: &Reading<'_, S>, z: &[S; 1], p: &[S; 1]) -> S {
-        first_order::contribution(at.nominal, z[0], p[0])
+        first_order::contribution(at, at.nominal, z[0], p[0])
     }
 
     fn state_derivative<S: Real>(at: &Reading<'_, S>, z: &[S; 1], p: &[S; 1]) -> [S; 1] {
-        [first_order::rate(at.nominal, z[0], p[0])]
+        [first_order::rate(at, at.nominal, z[0], p[0])]
     }
 
     fn initial_state<S: Real>(at: &Reading<'_, S>, _p: &[S; 1]) -> [S; 1] {

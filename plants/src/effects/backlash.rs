@@ -31,7 +31,7 @@ use super::first_order;
 /// `K = -K_A r/(2 K_C)` for a `ddmr`, `-K_A/K_C` for a `dc_axis`. Of the shaft's whole inertia the rotor
 /// is the share `-K_A·rotor`.
 ///
-/// Below 4 ms only a share of the rotor's lag is used (as in `actuator_lag`); `rotor = 0` is a rotor
+/// Of a very short lag of the rotor only a share is used (as in `actuator_lag`); `rotor = 0` is a rotor
 /// without inertia. Simplified: all the damping of the plant acts on the motor's side, so that
 /// within the gap the load coasts but for the other effects; real teeth are stiffer than `k`, by
 /// default 800/s, so that a stroke lasts some ms. Position is that of the load.
@@ -106,8 +106,8 @@ impl Effect for Backlash {
         let of_load = drive - at.get(Role::Armature);
         let gear = |wound: S, emf: S| {
             let left = drive - stiffness * wound;
-            let speed = left + first_order::contribution(left, emf, rotor);
-            [speed - of_load, first_order::rate(left, emf, rotor)]
+            let speed = left + first_order::contribution(at, left, emf, rotor);
+            [speed - of_load, first_order::rate(at, left, emf, rotor)]
         };
         let [a, b] = gear(engaged(ahead, play), emf);
         let [c, d] = gear(ahead_without, emf_without);

@@ -1,4 +1,4 @@
-//! Angles that begin anew after each turn, and counters that run over.
+//! Angles that begin anew after each turn, and counters, of time as well, that run over.
 
 use std::f64::consts::TAU;
 
@@ -7,7 +7,9 @@ use loopsight_model::sensor::Sensor;
 
 use super::Recording;
 use crate::fault::{Fault, FaultKind};
+use crate::median::median;
 use crate::plan::{Link, Plan};
+use crate::segment::NEW_RUN_PERIODS;
 
 /// What a counter runs over after, in its own numbers: the range of 16 or 32 bits.
 const COUNTERS: [f64; 2] = [65_536.0, 4_294_967_296.0];
@@ -48,6 +50,34 @@ pub(super) fn go_on(recording: &mut Recording, plan: &Plan) -> Vec<Fault> {
         }
     }
     found
+}
+
+/// Lets time stamps go on where the counter behind them ran over, and says how often it did: microseconds in 32 bits do each 72
+/// minutes. It ran over where whole numbers come back by nearly the whole range, and with the range the time goes on by some
+/// periods; what begins anew otherwise is another run.
+pub(super) fn run_on(stamps: &mut [f64]) -> usize {
+    if stamps.windows(2).all(|pair| pair[0] <= pair[1]) || stamps.iter().any(|t| t.fract() != 0.0) {
+        return 0;
+    }
+    let steps = stamps.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut forward: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
+    let most = NEW_RUN_PERIODS * median(&mut forward);
+    let (mut last, mut around, mut times) = (f64::NAN, 0.0, 0);
+    for stamp in stamps {
+        let goes_on = |whole: &f64| {
+            let step = *stamp + whole - last;
+            last < *whole && *stamp >= 0.0 && 0.0 < step && step <= most.min(whole * (1.0 - AROUND))
+        };
+        if *stamp < last
+            && let Some(whole) = COUNTERS.into_iter().find(goes_on)
+        {
+            around += whole;
+            times += 1;
+        }
+        last = *stamp;
+        *stamp += around;
+    }
+    times
 }
 
 /// The wholes that a signal may begin anew after, in SI.
@@ -107,6 +137,24 @@ mod tests {
 
     const INPUTS: [Signal; 1] = [Signal::new("voltage", "u", "V", ".")];
     const SIGNALS: [Signal; 1] = [Signal::new("angle", "p", "rad", ".")];
+
+    #[test]
+    fn counters_of_time_that_run_over_go_on_and_what_begins_at_zero_is_another_run() {
+        let of = |bits: u32, first: u64| -> Vec<f64> {
+            let stamps = (0..100).map(|k| (first + 1000 * k) % (1 << bits));
+            stamps.map(|stamp| stamp as f64).collect()
+        };
+        for (bits, first) in [(16, 60_000), (32, 4_294_960_000)] {
+            let mut stamps = of(bits, first);
+            let times = run_on(&mut stamps);
+            assert_eq!(times, if bits == 16 { 2 } else { 1 });
+            assert!(stamps.windows(2).all(|pair| pair[1] - pair[0] == 1000.0));
+        }
+        let two_runs = [of(32, 0), of(32, 0)].concat();
+        let mut kept = two_runs.clone();
+        assert_eq!(run_on(&mut kept), 0);
+        assert_eq!(kept, two_runs);
+    }
 
     #[test]
     fn angles_that_begin_anew_and_counters_that_run_over_go_on() {

@@ -1,0 +1,67 @@
+//! Observers with horizons over which a model tells something.
+
+use std::borrow::Cow;
+
+use loopsight_model::model::Model;
+use loopsight_model::run::Run;
+
+use crate::growth::Growth;
+use crate::observer::{SHORTEST, attach_observer_for};
+use crate::prediction::InitialStates;
+use crate::problem::Problem;
+use crate::progress::{Cancelled, Work};
+use crate::solve::Effort;
+use crate::stamps::shortest_period;
+
+/// `runs` with the observer that suits `growth`, or with one that forgets sooner, and the values of `model` that go with it.
+///
+/// A horizon says after what time an error of the state has grown too large. A model that lacks something drifts away sooner:
+/// what pushes a mass without a spring by a little more than the model says moves it by the square of the horizon. Over a horizon
+/// at whose end the model leaves as much as a constant would it tells nothing, so the horizon is halved until it leaves less. With
+/// an `effort` the model is fitted anew over each.
+pub(crate) fn attach_telling<'r>(
+    model: &Model,
+    values: Vec<f64>,
+    runs: &'r [Run],
+    growth: &Growth,
+    effort: Option<Effort>,
+    work: &Work<'_>,
+) -> Result<(Cow<'r, [Run]>, Vec<f64>), Cancelled> {
+    let shortest = SHORTEST * shortest_period(runs);
+    let (mut growth, mut values) = (growth.clone(), values);
+    loop {
+        let observed = attach_observer_for(model, &values, runs, &growth, work)?;
+        let left = left(model, &mut values, &observed, effort, work)?;
+        let tells = left < work.criteria().start.hopeless;
+        if tells || growth.horizon <= shortest || matches!(observed, Cow::Borrowed(_)) {
+            return Ok((observed, values));
+        }
+        growth.horizon = shortest.max(0.5 * growth.horizon);
+    }
+}
+
+/// What the model leaves of `runs`, as a share of the signals' deviations, with some `values`, or those that are fitted with an
+/// `effort` from them.
+fn left(
+    model: &Model,
+    values: &mut Vec<f64>,
+    runs: &[Run],
+    effort: Option<Effort>,
+    work: &Work<'_>,
+) -> Result<f64, Cancelled> {
+    let Ok(mut problem) = Problem::new(model, runs, work.silently()) else {
+        return Ok(0.0);
+    };
+    let states = match effort {
+        Some(_) => InitialStates::guess(model, values, runs).states,
+        None => InitialStates::estimate(model, values, runs, work)?.states,
+    };
+    let mut at = problem.pack(values, &states);
+    if let Some(effort) = effort
+        && let Ok(solution) = problem.solve_from(values, &states, effort)
+    {
+        at = problem.pack(&solution.values, &solution.states);
+        values.clone_from(&solution.values);
+    }
+    Ok(problem.residual_vector(&at)?.norm())
+}
