@@ -1,6 +1,7 @@
 //! Which effect is missing.
 
 use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use loopsight_recordings::{Fault, Severity};
 
 use crate::arrive::Starts;
@@ -27,6 +28,7 @@ use crate::progress::{Cancelled, Stage, Work};
 use crate::residual_force;
 use crate::search::{Found, Search};
 use crate::settings::FitSettings;
+use crate::signs::{self, SoFar};
 use crate::stamps;
 use crate::starts::Extent;
 use crate::sufficiency;
@@ -100,10 +102,54 @@ pub(crate) fn diagnose_for(
     if refused(&mut diagnosis, model, measurements, work.criteria()) {
         return Ok(diagnosis);
     }
-    match steps(&mut diagnosis, model, measurements, aim, work) {
+    match steps(&mut diagnosis, model, measurements, aim, work)
+        .and_then(|()| Ok(turned(&mut diagnosis, model, measurements, aim, work)?))
+    {
         Ok(()) | Err(FitError::Cancelled(Cancelled)) => Ok(diagnosis),
         Err(error) => Err(error),
     }
+}
+
+/// Adds the signal that counts the other way, where the model leaves much because one does.
+fn turned(
+    diagnosis: &mut Diagnosis,
+    model: &Model,
+    measurements: &Measurements<'_>,
+    aim: Aim,
+    work: &Work<'_>,
+) -> Result<(), Cancelled> {
+    let left = diagnosis.nominal.nrmse;
+    if !aim.force || left.is_nan() || left < work.criteria().start.stands {
+        return Ok(());
+    }
+    let best = diagnosis.candidates.first();
+    let so_far = SoFar {
+        error: best.map_or(left, |best| best.nrmse.min(left)),
+        horizon: diagnosis.observer.as_ref().map(|o| o.horizon_s),
+    };
+    let silent = work.silently();
+    let aim = Aim {
+        force: false,
+        ..aim
+    };
+    let diagnosed = |runs: &[Run]| {
+        let mut other = Diagnosis::begun(&[]);
+        match steps(&mut other, model, &Measurements::new(runs), aim, &silent) {
+            Err(FitError::Cancelled(cancelled)) => Err(cancelled),
+            _ if other.verdict != Conclusion::EffectMissing
+                || !so_far.allows(other.observer.as_ref()) =>
+            {
+                Ok(f64::INFINITY)
+            }
+            _ => Ok(other
+                .candidates
+                .first()
+                .map_or(f64::INFINITY, |best| best.nrmse)),
+        }
+    };
+    let advice = signs::advice(model, measurements.runs, so_far, &diagnosed, work)?;
+    diagnosis.advice.splice(0..0, advice);
+    Ok(())
 }
 
 impl Diagnosis {

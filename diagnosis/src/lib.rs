@@ -136,6 +136,7 @@ mod search;
 mod sensitivities;
 mod settings;
 mod shows;
+mod signs;
 mod sizes;
 mod solve;
 mod speeds;

@@ -54,7 +54,7 @@ impl Correction {
             None => (
                 Because::Integrating,
                 format!(
-                    "integrates (an error of its state has grown tenfold after {})",
+                    "integrates (it has drifted too far after {})",
                     seconds(horizon)
                 ),
             ),

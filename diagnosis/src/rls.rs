@@ -100,14 +100,17 @@ pub(crate) fn fit(
         for (k, j) in regression.parameters(row).iter().enumerate() {
             let theta = estimator.theta()[k];
             let error = (variance * estimator.covariance(k, k)).max(0.0).sqrt();
-            values[*j] = theta;
-            found.insert(*j, (theta, error, quantile));
+            // A parameter that moves two rates is in both rows. The one that determines it better counts.
+            let better = |(_, other, _): &(f64, f64, f64)| *other < error;
+            if !found.get(j).is_some_and(better) {
+                found.insert(*j, (theta, error, quantile));
+            }
         }
     }
     for (index, parameter) in model.parameters.iter().enumerate() {
         let estimate = match found.get(&index) {
             Some(&(value, error, quantile)) => Estimate {
-                value,
+                value: parameter.declaration.nearest(value),
                 unit: parameter.unit.clone(),
                 std_error: Some(error),
                 interval95: Some([value - quantile * error, value + quantile * error]),
@@ -131,7 +134,7 @@ pub(crate) fn fit(
                 },
             },
         };
-        if !values[index].is_finite() {
+        if !values[index].is_finite() || found.contains_key(&index) {
             values[index] = estimate.value;
         }
         parameters.insert(parameter.name.clone(), estimate);
