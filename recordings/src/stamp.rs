@@ -91,14 +91,8 @@ fn month(text: &str) -> Option<i64> {
 
 /// Days since 1970 of `2024-05-01`, or of a date that ends with its year, in an `order` where neither points nor a name say it.
 fn days(text: &str, order: Order) -> Option<i64> {
-    let mut parts = text.split(['-', '/', '.']);
-    let parts = [
-        parts.next()?,
-        parts.next()?,
-        parts.next()?,
-        parts.next().unwrap_or(""),
-    ];
-    let [first, second, third, ""] = parts else {
+    let parts: Vec<&str> = text.split(['-', '/', '.']).collect();
+    let [first, second, third] = parts[..] else {
         return None;
     };
     let named = second.starts_with(|c: char| c.is_ascii_alphabetic());
@@ -206,6 +200,7 @@ mod tests {
             "13:00 PM",
             "0:30 AM",
             "1.5.24 12:00",
+            "1.5.2024. 12:00",
             "13/13/2024 12:00",
             "01-Mai-2024 12:00",
         ] {
