@@ -13,7 +13,7 @@ use crate::fitted::Fit;
 use crate::flatness::Flatness;
 use crate::problem::Problem;
 use crate::settings::Method;
-use crate::stamps::shortest_period;
+use loopsight_model::run::shortest_period;
 
 /// A parameter by its index, with the unknowns that it is made of, and how much 1 of each is of it.
 type Shares = (usize, Vec<(usize, f64)>);

@@ -3,13 +3,12 @@
 use std::ops::Range;
 
 use loopsight_model::model::Model;
-use loopsight_model::run::Run;
+use loopsight_model::run::{Run, shortest_period};
 use loopsight_model::sensor::Sensor;
 
 use crate::criteria::LogCriteria;
 use crate::long::pieces;
 use crate::score::Tally;
-use crate::stamps::shortest_period;
 
 /// `nrmse` over all signals of a model without any fault.
 ///

@@ -5,12 +5,6 @@ use loopsight_model::run::Run;
 /// Periods longer than that many usual ones are gaps, and no jitter.
 const GAP: f64 = 1.5;
 
-/// The shortest usual time between samples among some runs, s.
-pub(crate) fn shortest_period(runs: &[Run]) -> f64 {
-    let periods = runs.iter().map(Run::median_period);
-    periods.fold(f64::INFINITY, f64::min)
-}
-
 /// How late stamps that jitter may be on average, s: a shift in time that is smaller is the logger's, and no effect of the
 /// machine.
 ///

@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 
 use loopsight_core::{Channel, Place, Shows};
 use loopsight_model::model::{Model, ModelParameter, Proposed};
-use loopsight_model::run::Run;
+use loopsight_model::run::{Run, shortest_period};
 
 use crate::arrive::Starts;
 use crate::candidates::Candidate;
 use crate::judge::nrmse;
 use crate::problem::{Problem, declared};
 use crate::settings::FitSettings;
-use crate::stamps::shortest_period;
 use crate::trial::{FINAL, Judged, Nominal};
 use crate::unfold::unfolded;
 

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use loopsight_model::model::Model;
-use loopsight_model::run::Run;
+use loopsight_model::run::{Run, shortest_period};
 
 use crate::growth::Growth;
 use crate::observer::{SHORTEST, attach_observer_for};
@@ -11,7 +11,6 @@ use crate::prediction::InitialStates;
 use crate::problem::Problem;
 use crate::progress::{Cancelled, Work};
 use crate::solve::Effort;
-use crate::stamps::shortest_period;
 
 /// `runs` with the observer that suits `growth`, or with one that forgets sooner, and the values of `model` that go with it.
 ///

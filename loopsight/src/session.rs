@@ -7,7 +7,7 @@ use loopsight_core::Signal;
 use loopsight_diagnosis::Measurements;
 use loopsight_model::log_map::LogMap;
 use loopsight_model::model::Model as Composed;
-use loopsight_model::run::Run;
+use loopsight_model::run::{Run, shortest_period};
 use loopsight_recordings::{Fault, Recording, RecordingError, Severity, Source};
 
 use crate::about::About;
@@ -276,8 +276,7 @@ fn matched(model: &mut Composed, log: &Log) -> Result<(Vec<Run>, Vec<Fault>)> {
             None => message,
         })
     })?;
-    let periods = recording.runs.iter().map(Run::median_period);
-    model.follow(periods.fold(f64::INFINITY, f64::min));
+    model.follow(shortest_period(&recording.runs));
     stamps::check(model, log, &recording)?;
     bounded::log(&log.name, model, &recording.runs)?;
     Ok((recording.runs, recording.faults))

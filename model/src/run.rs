@@ -294,6 +294,12 @@ impl Run {
     }
 }
 
+/// The shortest usual time between samples among some runs, s.
+pub fn shortest_period(runs: &[Run]) -> f64 {
+    let periods = runs.iter().map(Run::median_period);
+    periods.fold(f64::INFINITY, f64::min)
+}
+
 /// Whether `time` can be the time stamp of a sample behind `before`.
 fn follows(before: Option<f64>, sample: usize, time: f64) -> Result<(), RunError> {
     if !time.is_finite() {

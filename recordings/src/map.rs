@@ -238,15 +238,13 @@ impl<'a> Mapper<'a> {
         // Shifted before scaled: large stamps (microseconds since 1970) keep their digits.
         let first_row = range.start;
         let origin = rows.row(first_row)[time.column];
-        let mut times = Vec::with_capacity(range.len());
-        let mut stamps: Vec<f64> = range.clone().map(|at| rows.row(at)[time.column]).collect();
-        self.wrapped += turns::run_on(&mut stamps);
-        for (at, stamp) in range.clone().zip(stamps) {
-            self.check(run, at, time, stamp, "the time")?;
-            self.seconds(run, at, stamp * time.factor)?;
-            let shifted = self.exact((stamp - origin) * time.factor);
-            self.limit(run, at, time, shifted)?;
-            times.push(shifted);
+        let mut times: Vec<f64> = range.clone().map(|at| rows.row(at)[time.column]).collect();
+        self.wrapped += turns::run_on(&mut times);
+        for (at, stamp) in range.clone().zip(&mut times) {
+            self.check(run, at, time, *stamp, "the time")?;
+            self.seconds(run, at, *stamp * time.factor)?;
+            *stamp = self.exact((*stamp - origin) * time.factor);
+            self.limit(run, at, time, *stamp)?;
         }
         self.rows += times.len();
         // A channel with a clock of its own says nothing while it stays as it is.

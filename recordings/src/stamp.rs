@@ -9,13 +9,6 @@
 const DAY: i64 = 86_400;
 const NANO: i64 = 1_000_000_000;
 
-/// Orders of the parts of a date that ends with its year.
-#[derive(Clone, Copy)]
-enum Order {
-    DayFirst,
-    MonthFirst,
-}
-
 /// What a date and time may be, in nanoseconds since 1970, or since midnight where there is no date: with its day before its
 /// month, and with its month before its day. Nearly all have one order, and are the same twice.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +17,17 @@ pub(crate) struct Instant([Option<i64>; 2]);
 impl Instant {
     /// None of what is no time.
     pub(crate) fn of(text: &str) -> Option<Self> {
-        let instant = [Order::DayFirst, Order::MonthFirst].map(|order| nanoseconds(text, order));
+        let text = text.trim();
+        let (date, time) = match text.split_once(['T', 't', ' ']) {
+            Some((date, time)) if !date.contains(':') => (Some(date), time.trim_start()),
+            _ => (None, text),
+        };
+        let days = date.map_or([Some(0); 2], days);
+        let (seconds, nano) = time_of_day(time)?;
+        let instant = days.map(|days| {
+            let seconds = days?.checked_mul(DAY)?.checked_add(seconds)?;
+            seconds.checked_mul(NANO)?.checked_add(nano)
+        });
         instant.iter().any(Option::is_some).then_some(Self(instant))
     }
 
@@ -37,14 +40,9 @@ impl Instant {
     }
 }
 
-fn nanoseconds(text: &str, order: Order) -> Option<i64> {
-    let text = text.trim();
-    let (date, time) = match text.split_once(['T', 't', ' ']) {
-        Some((date, time)) if !date.contains(':') => (Some(date), time.trim_start()),
-        _ => (None, text),
-    };
-    let days = date.map_or(Some(0), |date| days(date, order))?;
-    let (time, afternoon) = half_of_day(time);
+/// Seconds since midnight, in UTC where a zone is given, and nanoseconds.
+fn time_of_day(text: &str) -> Option<(i64, i64)> {
+    let (time, afternoon) = half_of_day(text);
     let (clock, shift) = zone(time)?;
     let (mut seconds, nano) = of_clock(clock)?;
     if let Some(afternoon) = afternoon {
@@ -54,8 +52,7 @@ fn nanoseconds(text: &str, order: Order) -> Option<i64> {
         }
         seconds = seconds % (12 * hour) + if afternoon { 12 * hour } else { 0 };
     }
-    let seconds = days.checked_mul(DAY)?.checked_add(seconds - shift)?;
-    seconds.checked_mul(NANO)?.checked_add(nano)
+    Some((seconds - shift, nano))
 }
 
 /// A time without `AM` or `PM` behind it, and whether it is one of the afternoon where that is said.
@@ -89,18 +86,26 @@ fn month(text: &str) -> Option<i64> {
     }
 }
 
-/// Days since 1970 of `2024-05-01`, or of a date that ends with its year, in an `order` where neither points nor a name say it.
-fn days(text: &str, order: Order) -> Option<i64> {
+/// Days since 1970 of `2024-05-01`, or of a date that ends with its year: with the day first, and with the month first. Where
+/// points or a name say which is which, they are the same.
+fn days(text: &str) -> [Option<i64>; 2] {
     let parts: Vec<&str> = text.split(['-', '/', '.']).collect();
     let [first, second, third] = parts[..] else {
-        return None;
+        return [None; 2];
     };
+    if first.len() == 4 {
+        return [days_of(first, second, third); 2];
+    }
+    let day_first = days_of(third, second, first);
     let named = second.starts_with(|c: char| c.is_ascii_alphabetic());
-    let (year, month_text, day) = match order {
-        _ if first.len() == 4 => (first, second, third),
-        Order::MonthFirst if !named && !text.contains('.') => (third, first, second),
-        _ => (third, second, first),
-    };
+    match named || text.contains('.') {
+        true => [day_first; 2],
+        false => [day_first, days_of(third, first, second)],
+    }
+}
+
+/// Days since 1970 of a year, a month and a day.
+fn days_of(year: &str, month_text: &str, day: &str) -> Option<i64> {
     let year = digits(year, 4..=4)?;
     let month = month(month_text)?;
     let day = digits(day, 1..=2).filter(|d| (1..=31).contains(d))?;
