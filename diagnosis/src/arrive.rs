@@ -12,7 +12,7 @@ use crate::settings::FitSettings;
 use crate::solve::Effort;
 
 /// Spans of the regressions that a fit may start from, s.
-const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
+pub(crate) const SPANS: [f64; 3] = [0.0, 0.05, 0.2];
 /// Most other starts that are tried, the best first.
 pub(crate) const OTHERS: usize = 6;
 /// Effort spent on each start but the first.

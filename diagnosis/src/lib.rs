@@ -126,6 +126,7 @@ mod progress;
 mod promise;
 mod refine;
 mod refined;
+mod regressed;
 mod regression;
 mod residual_force;
 mod rls;

@@ -131,11 +131,10 @@ impl Search<'_> {
             })
             .collect();
         in_order(&mut finalists);
-        for found in self.shrunk(&finalists) {
-            finalists.retain(|(other, _)| !other.candidate.is_again(&found.0.candidate));
-            finalists.push(found);
-        }
-        in_order(&mut finalists);
+        let regressed = self.regressed(&finalists);
+        exchange(&mut finalists, regressed);
+        let shrunk = self.shrunk(&finalists);
+        exchange(&mut finalists, shrunk);
         let looked = if self.work.is_cancelled() {
             contest
         } else {
@@ -151,7 +150,7 @@ impl Search<'_> {
     /// The full fit of a candidate, where that promises a cost of at most `most`. An effect whose fitted size is nothing
     /// explains nothing, whatever the other parameters gained; nor does a shift in time that the stamps may have of their
     /// own, nor directions that are alike, nor what is a simpler effect for all that the log shows.
-    fn finished(&self, first: Judged, most: f64) -> Option<(Judged, Explanation)> {
+    pub(crate) fn finished(&self, first: Judged, most: f64) -> Option<(Judged, Explanation)> {
         let (judged, fit) = finish(first, self.nominal, most)?;
         let explanation = explain(&judged, &fit, self.nominal).ok()?;
         let criteria = self.work.criteria();
@@ -253,6 +252,15 @@ impl Search<'_> {
 /// The least error among some candidates.
 pub(crate) fn least<'j>(found: impl Iterator<Item = &'j Judged>) -> f64 {
     found.map(Judged::error).fold(f64::INFINITY, f64::min)
+}
+
+/// Puts `better` fits in the place of those of the same candidates.
+fn exchange(finalists: &mut Vec<(Judged, Explanation)>, better: Vec<(Judged, Explanation)>) {
+    for found in better {
+        finalists.retain(|(other, _)| !other.candidate.is_again(&found.0.candidate));
+        finalists.push(found);
+    }
+    in_order(finalists);
 }
 
 /// Puts finalists in order, the best first.

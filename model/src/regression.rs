@@ -125,18 +125,23 @@ impl Regression {
     ///
     /// [`RegressionError`] where there is no such state, or a free parameter enters non-linearly.
     pub fn new(model: &Model, scheme: Scheme) -> Result<Self, RegressionError> {
-        let mut regression = Self::without_rows(model, scheme)?;
-        let controlled = model.plant.controlled;
-        regression.find_rows(controlled.iter().copied());
-        let told = told(model);
+        Self::without_rows(model, scheme)?.of_all_rates()
+    }
+
+    /// With a row for each controlled state, and for each other one that sensors tell and a free parameter moves.
+    fn of_all_rates(mut self) -> Result<Self, RegressionError> {
+        let controlled = self.model.plant.controlled;
+        self.find_rows(controlled.iter().copied());
+        let told = told(&self.model);
         let others = (0..told.len()).filter(|i| told[*i] && !controlled.contains(i));
-        regression.find_rows(others);
+        self.find_rows(others);
         let moved = |row: &Row| !row.parameters.is_empty();
-        (regression.rows).retain(|row| moved(row) || controlled.contains(&row.state));
-        if regression.rows.is_empty() {
-            return Err(RegressionError::NoRates(model.plant.id.to_owned()));
+        (self.rows).retain(|row| moved(row) || controlled.contains(&row.state));
+        if self.rows.is_empty() {
+            let plant = self.model.plant.id.to_owned();
+            return Err(RegressionError::NoRates(plant));
         }
-        Ok(regression)
+        Ok(self)
     }
 
     fn without_rows(model: &Model, scheme: Scheme) -> Result<Self, RegressionError> {
@@ -194,19 +199,37 @@ impl Regression {
         scheme: Scheme,
         period: f64,
     ) -> Result<Self, RegressionError> {
+        if model.plant.controlled.is_empty() {
+            return Err(RegressionError::NoRates(model.plant.id.to_owned()));
+        }
+        let mut regression = Self::acting(model, scheme, period)?;
+        regression.find_rows(model.plant.controlled.iter().copied());
+        Ok(regression)
+    }
+
+    /// As [`Regression::with_effects`], of all states that [`Regression::new`] reads.
+    ///
+    /// # Errors
+    ///
+    /// [`RegressionError`] where there is no such state, or a free parameter without a value enters non-linearly.
+    pub fn with_effects_of_all(
+        model: &Model,
+        scheme: Scheme,
+        period: f64,
+    ) -> Result<Self, RegressionError> {
+        Self::acting(model, scheme, period)?.of_all_rates()
+    }
+
+    fn acting(model: &Model, scheme: Scheme, period: f64) -> Result<Self, RegressionError> {
         let mut linear = model.clone();
         for parameter in &mut linear.parameters {
             parameter.free &= parameter.declaration.linear || parameter.value.is_none();
-        }
-        if model.plant.controlled.is_empty() {
-            return Err(RegressionError::NoRates(model.plant.id.to_owned()));
         }
         let mut regression = Self::without_rows(&linear, scheme)?;
         let values: Vec<f64> = (linear.parameters.iter())
             .map(|p| p.value.unwrap_or(0.0))
             .collect();
         regression.acting = Acting::new(&linear, &values, period);
-        regression.find_rows(model.plant.controlled.iter().copied());
         Ok(regression)
     }
 
@@ -331,6 +354,11 @@ impl Regression {
     /// Indices (into the model's parameters) of the `row`-th regression's `θ`.
     pub fn parameters(&self, row: usize) -> &[usize] {
         &self.rows[row].parameters
+    }
+
+    /// Index of the state whose rate the `row`-th regression explains.
+    pub fn state(&self, row: usize) -> usize {
+        self.rows[row].state
     }
 
     /// Regressor and left-hand side of the `row`-th regression, after a [`Regression::push`] that
