@@ -42,7 +42,7 @@ impl Effect for ActuatorLag {
         example: "[[effect]]\n[effect.actuator_lag]\nat = [\"input.right\", \"input.left\"]\nlag = 0.03\n",
         places: &[PlaceKind::Input],
         parameters: &[Parameter::new("lag", "T", "s", "time constant")
-            .within(0.0, 2.0)
+            .within(0.0, 3600.0)
             .or(0.0)
             .nonlinear()
             .scaled(0.02)],

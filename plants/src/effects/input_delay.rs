@@ -34,7 +34,7 @@ impl Effect for InputDelay {
         places: &[PlaceKind::Input],
         parameters: &[
             Parameter::new("delay", "τ", "s", "time from the log to the actuator")
-                .within(0.0, 0.5)
+                .within(0.0, 3600.0)
                 .or(0.0)
                 .nonlinear()
                 .scaled(0.01),

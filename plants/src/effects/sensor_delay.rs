@@ -34,7 +34,7 @@ impl Effect for SensorDelay {
         places: &[PlaceKind::Output],
         parameters: &[
             Parameter::new("delay", "τ", "s", "age of the measurement when stamped")
-                .within(0.0, 0.5)
+                .within(0.0, 3600.0)
                 .or(0.0)
                 .nonlinear()
                 .scaled(0.01),

@@ -42,7 +42,7 @@ impl Effect for SensorLag {
         example: "[[effect]]\n[effect.sensor_lag]\nat = [\"sensor.linear_velocity\", \"sensor.angular_velocity\"]\nlag = 0.03\n",
         places: &[PlaceKind::Output],
         parameters: &[Parameter::new("lag", "T", "s", "time constant")
-            .within(0.0, 2.0)
+            .within(0.0, 3600.0)
             .or(0.0)
             .nonlinear()
             .scaled(0.02)],

@@ -39,7 +39,7 @@ impl Effect for SensorWindow {
         places: &[PlaceKind::Output],
         parameters: &[
             Parameter::new("window", "W", "s", "length of the moving mean")
-                .within(0.0, 1.0)
+                .within(0.0, 3600.0)
                 .or(0.0)
                 .nonlinear()
                 .scaled(0.02),
