@@ -295,6 +295,11 @@ mod tests {
         is("mrad", 1e-3, "rad");
         is("deg", PI / 180.0, "rad");
         is("rpm", PI / 30.0, "s^-1 rad");
+        is("dps", PI / 180.0, "s^-1 rad");
+        is("rps", 2.0 * PI, "s^-1 rad");
+        is("kph", 1.0 / 3.6, "m s^-1");
+        is("mps", 1.0, "m s^-1");
+        is("mph", 0.44704, "m s^-1");
         is("counts", 1.0, "1");
         is("%", 0.01, "1");
         is("1", 1.0, "1");

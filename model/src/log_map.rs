@@ -2,15 +2,15 @@
 
 mod labels;
 mod list;
+mod measured;
 mod ranges;
 
 use std::collections::BTreeMap;
 
 pub use labels::Labels;
+pub use measured::Measured;
 pub use ranges::Ranges;
 use serde::{Deserialize, Serialize};
-
-use crate::sensor::Sensor;
 
 /// Where the label of an experiment stands in the name of a column.
 const PLACE: &str = "{}";
@@ -226,28 +226,4 @@ impl ColumnMap {
             ColumnMap::Full(column) => column.hold,
         }
     }
-}
-
-/// A measured signal: which column, and what kind of sensor made it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a table as `{ column = \"name\" }`")]
-pub struct Measured {
-    /// Name in the header, or a sum or difference of names; by default found by the signal's id.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub column: Option<String>,
-    /// Unit when the name does not end with it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unit: Option<String>,
-    /// Factor; `-1` reverses the sign.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub scale: Option<f64>,
-    /// Unit of `scale` where the column holds what a transducer makes of the signal: `m/V`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub scale_unit: Option<String>,
-    /// Added at last, in SI: an angle that is counted from elsewhere.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub offset: Option<f64>,
-    /// How the number is made.
-    #[serde(default, skip_serializing_if = "Sensor::is_default")]
-    pub sensor: Sensor,
 }

@@ -407,7 +407,7 @@ pub enum RecordingError {
     },
     /// A unit that measures something else.
     #[error(
-        "{log}: column `{column}` is in {unit} ({found}), but `{id}` is in {expected_unit} ({expected}); if the ending of the name is no unit, give `unit = \"{expected_unit}\"` in the model's [log]"
+        "{log}: column `{column}` is in {unit} ({found}), but `{id}` is in {expected_unit} ({expected}); if the ending of the name is no unit, give `unit = \"{expected_unit}\"` in the model's [log]; if a factor turns one into the other, its unit is `scale_unit`: a radius of 0.1 m makes m/s of rpm by `scale = 0.1, scale_unit = \"m/rad\"`"
     )]
     UnitMismatch {
         /// The file.

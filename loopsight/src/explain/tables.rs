@@ -91,7 +91,7 @@ pub(super) static TABLES: [PartMeta; 3] = [
             key(
                 "measured.ID",
                 "",
-                "a measured signal; without any, all signals that the log has by name",
+                "a measured signal: the channel, or the keys below; without any, all signals that the log has by name",
             ),
             key(
                 "measured.ID.column",
