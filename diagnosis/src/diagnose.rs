@@ -1,6 +1,8 @@
 //! Which effect is missing.
 
-use loopsight_model::model::Model;
+use std::borrow::Cow;
+
+use loopsight_model::model::{Model, Origin};
 use loopsight_model::run::Run;
 use loopsight_recordings::{Fault, Severity};
 
@@ -20,7 +22,7 @@ use crate::holdout::{Holdout, Judgement};
 use crate::judge::{Losses, nrmse};
 use crate::measurements::Measurements;
 use crate::observer::{Correction, attach_same_observer};
-use crate::output_error::prepare;
+use crate::output_error::{Unaided, prepare};
 use crate::pairs::pair;
 use crate::prediction::{Solution, moves_starts, signal_rms};
 use crate::problem::Problem;
@@ -147,9 +149,24 @@ fn turned(
                 .map_or(f64::INFINITY, |best| best.nrmse)),
         }
     };
-    let advice = signs::advice(model, measurements.runs, so_far, &diagnosed, work)?;
+    let fitted = diagnosis.model.as_ref();
+    let model = fitted.map_or(Cow::Borrowed(model), |fitted| {
+        Cow::Owned(with_widths_of(model, fitted))
+    });
+    let advice = signs::advice(&model, measurements.runs, so_far, &diagnosed, work)?;
     diagnosis.advice.splice(0..0, advice);
     Ok(())
+}
+
+/// `model` with the widths that the log gave the signs of the `fitted` one: they need not be found again.
+fn with_widths_of(model: &Model, fitted: &Model) -> Model {
+    let mut model = model.clone();
+    for (own, found) in model.parameters.iter_mut().zip(&fitted.parameters) {
+        if found.origin == Origin::Log && found.name == own.name {
+            (own.origin, own.value) = (found.origin, found.value);
+        }
+    }
+    model
 }
 
 impl Diagnosis {
@@ -211,7 +228,13 @@ fn steps(
 ) -> Result<(), FitError> {
     let silent = work.silently();
     let read = Read::of(model, measurements);
-    let prepared = prepare(model, read.runs(), &FitSettings::default(), &silent)?;
+    let prepared = prepare(
+        model,
+        read.runs(),
+        &FitSettings::default(),
+        Unaided::Sought,
+        &silent,
+    )?;
     let (model, runs) = (&*prepared.model, &*prepared.runs);
     let test = (read.test()).map(|test| attach_same_observer(model, test, runs, work));
     let test = test.transpose()?;

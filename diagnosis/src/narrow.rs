@@ -1,11 +1,13 @@
 //! Signs as sharp as the motion in a recording asks for, where a model file leaves that open.
 
+use std::borrow::Cow;
+
 use loopsight_model::model::{Model, Origin};
 use loopsight_model::run::Run;
 
 use crate::arrive::Starts;
 use crate::error::FitError;
-use crate::output_error::prepare;
+use crate::output_error::{Unaided, prepare};
 use crate::prediction::signal_rms;
 use crate::problem::Problem;
 use crate::progress::Work;
@@ -35,6 +37,7 @@ const SHORT: Effort = Effort {
 pub(crate) fn narrowed(
     model: &Model,
     runs: &[Run],
+    unaided: Unaided,
     work: &Work<'_>,
 ) -> Result<Option<Model>, FitError> {
     let open: Vec<usize> = (0..model.parameters.len())
@@ -53,7 +56,7 @@ pub(crate) fn narrowed(
     for i in &open {
         narrower.parameters[*i].origin = Origin::Log;
     }
-    match narrowed_if_wide(narrower, &open, runs, &work.silently()) {
+    match narrowed_if_wide(narrower, &open, runs, unaided, &work.silently()) {
         Err(FitError::Cancelled(cancelled)) => Err(cancelled.into()),
         // The fit itself will say why.
         Err(_) => Ok(None),
@@ -66,10 +69,12 @@ fn narrowed_if_wide(
     mut model: Model,
     open: &[usize],
     runs: &[Run],
+    unaided: Unaided,
     work: &Work<'_>,
 ) -> Result<Option<Model>, FitError> {
     let criteria = work.criteria();
-    let (_, rms) = short_fit(&model, runs, work)?;
+    let first = short_fit(&model, runs, unaided, work)?;
+    let rms = first.rms;
     let suits = widths(&model, &rms, criteria.search.sign_width);
     let wide = |(i, suits): &(usize, f64)| {
         let value = model.parameters[*i].value;
@@ -85,11 +90,15 @@ fn narrowed_if_wide(
         }
     };
     set(&mut model, 1.0);
-    let (mut least, _) = short_fit(&model, runs, work)?;
+    let unaided = match first.aided {
+        true => Unaided::Known,
+        false => unaided,
+    };
+    let mut least = short_fit(&model, runs, unaided, work)?.error;
     for halvings in 1..=HALVINGS {
         let mut sharper = model.clone();
         set(&mut sharper, 0.5f64.powi(halvings));
-        let (error, _) = short_fit(&sharper, runs, work)?;
+        let error = short_fit(&sharper, runs, unaided, work)?.error;
         if error.is_nan() || error >= criteria.improve.sharper * least {
             break;
         }
@@ -98,10 +107,25 @@ fn narrowed_if_wide(
     Ok(Some(model))
 }
 
-/// Root of the cost that a short fit of `model` ends with, and the root mean squares of the signals there.
-fn short_fit(model: &Model, runs: &[Run], work: &Work<'_>) -> Result<(f64, Vec<f64>), FitError> {
+/// A short fit.
+struct Short {
+    /// Root of the cost.
+    error: f64,
+    /// Root mean squares of the signals.
+    rms: Vec<f64>,
+    /// Whether an observer corrects the free run.
+    aided: bool,
+}
+
+/// A short fit of `model`.
+fn short_fit(
+    model: &Model,
+    runs: &[Run],
+    unaided: Unaided,
+    work: &Work<'_>,
+) -> Result<Short, FitError> {
     let settings = FitSettings::default();
-    let prepared = prepare(model, runs, &settings, work)?;
+    let prepared = prepare(model, runs, &settings, unaided, work)?;
     let mut problem = Problem::new(&prepared.model, &prepared.runs, work.clone())?;
     let arrived = problem.arrive(&settings, Starts::Best, SHORT)?;
     let error = problem.residual_vector(&arrived.solution)?.norm();
@@ -113,5 +137,6 @@ fn short_fit(model: &Model, runs: &[Run], work: &Work<'_>) -> Result<(f64, Vec<f
         &prepared.runs,
         work,
     )?;
-    Ok((error, rms))
+    let aided = matches!(prepared.runs, Cow::Owned(_));
+    Ok(Short { error, rms, aided })
 }

@@ -45,7 +45,7 @@ pub(crate) fn fit(
     settings: &FitSettings,
     work: &Work<'_>,
 ) -> Result<Fit, FitError> {
-    let prepared = prepare(model, runs, settings, work)?;
+    let prepared = prepare(model, runs, settings, Unaided::Sought, work)?;
     let mut problem = Problem::new(&prepared.model, &prepared.runs, work.clone())?;
     match in_two_passes(&mut problem, settings) {
         Err(FitError::Cancelled(cancelled)) => {
@@ -90,16 +90,27 @@ fn in_two_passes(problem: &mut Problem<'_>, settings: &FitSettings) -> Result<Fi
 pub(crate) fn fitted_values(
     model: &Model,
     runs: &[Run],
+    unaided: Unaided,
     effort: Effort,
     work: &Work<'_>,
 ) -> Result<Model, FitError> {
     let settings = FitSettings::default();
-    let prepared = prepare(model, runs, &settings, work)?;
+    let prepared = prepare(model, runs, &settings, unaided, work)?;
     let mut problem = Problem::new(&prepared.model, &prepared.runs, work.clone())?;
     let arrived = problem.solve_in_two_passes(&settings, Starts::Best, effort)?;
     let mut fitted = problem.model.clone();
     fitted.set_values(&problem.values_at(&arrived.solution));
     Ok(fitted)
+}
+
+/// Whether a model that needs an observer with its first values is fitted to the free run, for values with which it needs none.
+/// That takes much, and leads nowhere where a fit has already found that it needs one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unaided {
+    /// It is.
+    Sought,
+    /// A fit has found what it needs.
+    Known,
 }
 
 /// A model and recordings, ready for a fit.
@@ -129,10 +140,11 @@ pub(crate) fn prepare<'a>(
     model: &'a Model,
     runs: &'a [Run],
     settings: &FitSettings,
+    unaided: Unaided,
     work: &Work<'_>,
 ) -> Result<Prepared<'a>, FitError> {
     let mut model = tied(model, runs, &work.criteria().log);
-    if let Some(narrower) = narrowed(&model, runs, work)? {
+    if let Some(narrower) = narrowed(&model, runs, unaided, work)? {
         model = Cow::Owned(narrower);
     }
     let mut prepared = Prepared {
@@ -147,7 +159,9 @@ pub(crate) fn prepare<'a>(
         return Ok(prepared);
     };
     let mut present = model.clone();
-    if let Some(values) = free_values(model, runs, settings, work)? {
+    if unaided == Unaided::Sought
+        && let Some(values) = free_values(model, runs, settings, work)?
+    {
         present.set_values(&values);
         prepared.model = Cow::Owned(present);
         return Ok(prepared);

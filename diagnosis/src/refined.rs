@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::compare::free_run_error;
 use crate::error::FitError;
 use crate::measurements::Measurements;
-use crate::output_error::fitted_values;
+use crate::output_error::{Unaided, fitted_values};
 use crate::progress::{Cancelled, Stage, Work};
 use crate::solve::Effort;
 
@@ -155,7 +155,7 @@ pub(crate) fn refitted(
     work: &Work<'_>,
 ) -> Result<(f64, Model), FitError> {
     let begun = model.clone().with_steps_by_motion();
-    let mut fitted = fitted_values(&begun, measurements.runs, CORRECTION, work)?;
+    let mut fitted = fitted_values(&begun, measurements.runs, Unaided::Known, CORRECTION, work)?;
     let judging = Measurements::new(measurements.judging());
     let error = free_run_error(&fitted, &judging, work)?;
     fitted.by_motion = false;

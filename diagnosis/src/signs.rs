@@ -2,13 +2,14 @@
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
+use rayon::prelude::*;
 
 use crate::compare::free_run_error;
 use crate::conclusion::Advice;
 use crate::error::FitError;
 use crate::measurements::Measurements;
 use crate::observer::{Correction, attach_observer};
-use crate::output_error::fitted_values;
+use crate::output_error::{Unaided, fitted_values};
 use crate::progress::{Cancelled, Work};
 use crate::solve::Effort;
 
@@ -50,7 +51,7 @@ enum Signal {
 }
 
 /// What a diagnosis makes of a recording: the error that the effect leaves which it names; infinite where it names none.
-pub(crate) type Diagnosed<'d> = &'d dyn Fn(&[Run]) -> Result<f64, Cancelled>;
+pub(crate) type Diagnosed<'d> = &'d (dyn Fn(&[Run]) -> Result<f64, Cancelled> + Sync);
 
 /// Of a model that leaves much, and with the best effect `so_far`: the signal that it can be fitted with once it counts the
 /// other way, which is the most frequent mistake in a model file. It is looked for with the model alone first. Where that could not
@@ -77,8 +78,9 @@ pub(crate) fn advice(
         let mut best: Option<(Signal, f64)> = None;
         let mut signals: Vec<Signal> = measured.chain(inputs).collect();
         signals.sort_by_key(|signal| read(model, *signal).0 > 0.0);
-        for signal in signals {
-            let left = leaves(&turned(model, runs, signal))?;
+        let left_with = |signal: &Signal| Ok((*signal, leaves(&turned(model, runs, *signal))?));
+        let left = signals.par_iter().map(left_with);
+        for (signal, left) in left.collect::<Result<Vec<_>, Cancelled>>()? {
             let better = best.is_none_or(|(_, least)| left < BETTER * least);
             if better && left < most {
                 best = Some((signal, left));
@@ -94,7 +96,7 @@ pub(crate) fn advice(
 /// What a fit of `model` leaves of `runs`; infinite where it is helped sooner than before.
 fn left(model: &Model, runs: &[Run], so_far: SoFar, work: &Work<'_>) -> Result<f64, Cancelled> {
     let silent = work.silently();
-    let fitted = match fitted_values(model, runs, EFFORT, &silent) {
+    let fitted = match fitted_values(model, runs, Unaided::Sought, EFFORT, &silent) {
         Ok(fitted) => fitted,
         Err(FitError::Cancelled(cancelled)) => return Err(cancelled),
         Err(_) => return Ok(f64::INFINITY),
