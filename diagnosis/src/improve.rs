@@ -194,6 +194,7 @@ impl State {
             || self.is_complete(work.criteria()).then(last),
         );
         let diagnosis = diagnosis?;
+        self.measured(&diagnosis);
         self.fitted = fitted.and_then(Result::ok).filter(|fit| !fit.cancelled);
         if let Some(fitted) = &diagnosis.model
             && self.steps.is_empty()
@@ -204,11 +205,21 @@ impl State {
                 round: Some(round),
                 nrmse_fit: diagnosis.nominal_fit,
                 nrmse_test: diagnosis.nominal.nrmse,
+                twins: Vec::new(),
                 still_open: Vec::new(),
             });
             self.present = fitted.clone();
         }
         Ok(diagnosis)
+    }
+
+    /// Gives a step that came of the correction of another one the errors that the next diagnosis begins with.
+    fn measured(&mut self, diagnosis: &Diagnosis) {
+        let last = self.steps.last_mut();
+        if let Some(last) = last.filter(|step| step.round.is_none()) {
+            last.nrmse_fit = diagnosis.nominal_fit;
+            last.nrmse_test = diagnosis.nominal.nrmse;
+        }
     }
 
     /// Whether the last step left hardly more than noise. Then the next diagnosis mostly finds nothing.
@@ -225,12 +236,15 @@ impl State {
     fn step(&mut self, best: Explanation, round: usize, work: &Work<'_>) {
         work.in_round(round).know(|| Finding::Added((&best).into()));
         let steps = self.steps.clone();
+        let mut twins = best.indistinguishable_from;
+        twins.insert(0, best.place.clone());
         self.steps.push(ImprovementStep {
             added: Some(best.place),
             entries: best.entries,
             round: Some(round),
             nrmse_fit: best.nrmse_fit,
             nrmse_test: best.nrmse,
+            twins,
             still_open: Vec::new(),
         });
         self.before = Some((std::mem::replace(&mut self.present, best.model), steps));
@@ -249,7 +263,7 @@ impl State {
         let tried = refine(
             &mut self.present,
             &mut self.steps,
-            &self.diagnoses[..round],
+            &self.diagnoses[..=round],
             measurements,
             &work.in_round(round),
         )?;
@@ -422,6 +436,7 @@ mod tests {
             round: Some(0),
             nrmse_fit: 0.1,
             nrmse_test: 0.1,
+            twins: Vec::new(),
             still_open: Vec::new(),
         };
         let mut state = State::new(&of(8.0), Discover::Never);

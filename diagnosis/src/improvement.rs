@@ -23,6 +23,9 @@ pub struct ImprovementStep {
     pub nrmse_fit: f64,
     /// Free-run error on the validation data.
     pub nrmse_test: f64,
+    /// What the data could not tell from it when it was added, and what it was named then.
+    #[serde(skip)]
+    pub twins: Vec<EffectAt>,
     /// What the data cannot tell from it, with all that was added later in the model.
     #[serde(skip)]
     pub still_open: Vec<EffectAt>,

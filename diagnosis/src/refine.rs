@@ -22,9 +22,8 @@ use crate::suited::smooth;
 ///
 /// * an effect that the last one made needless is removed, and its step with it;
 /// * a simpler effect replaces one that contains it, where the error hardly grows; so do two with fewer parameters;
-/// * an effect that the data could not tell from an earlier one replaces it, where the error falls (the
-///   `diagnoses` of the earlier steps name them); the same effect at fewer places only where nothing else is missing
-///   then;
+/// * an effect that the last of the `diagnoses` did not name is replaced by a twin, which the data could not tell from it when it
+///   was added, where the error falls; by the same effect at fewer places only where nothing else is missing then;
 /// * the sign of the last effect is made sharper while the error falls.
 ///
 /// The steps are changed with the model. If the work is cancelled, the two still agree. None where the last step is no
@@ -45,7 +44,7 @@ pub(crate) fn refine(
         return Ok(None);
     }
     simplified(&mut best, steps)?;
-    split(&mut best, steps)?;
+    split(&mut best, steps, diagnoses)?;
     let others = with_others(best.model, steps, diagnoses);
     best.try_all(&others)?;
     reconsidered(&mut best, steps, diagnoses)?;
@@ -64,8 +63,9 @@ fn with_fewer(model: &Model, steps: &[ImprovementStep]) -> Vec<Model> {
 
 /// The models with a twin in place of an effect, or with a sharper sign.
 fn with_others(model: &Model, steps: &[ImprovementStep], diagnoses: &[Diagnosis]) -> Vec<Model> {
-    let twins = |step| models(twins_in(model, step, diagnoses));
-    let all = steps.iter().flat_map(twins);
+    let twins = |step| models(twins_in(model, step));
+    let earlier = steps.iter().filter(|step| is_earlier(step, diagnoses));
+    let all = earlier.flat_map(twins);
     // The sharper sign takes longest.
     sharper(model).into_iter().chain(all).collect()
 }
@@ -225,39 +225,42 @@ fn reconsidered(
     let criteria = best.work.criteria();
     let better = criteria.improve.better;
     let floor = diagnoses.last().map_or(0.0, |d| d.floor.nrmse);
-    for step in steps {
+    for step in steps.iter_mut().filter(|step| is_earlier(step, diagnoses)) {
         let Some(place) = step.added.as_ref() else {
             continue;
         };
-        let twins = twins_in(best.model, step, diagnoses).into_iter();
+        let twins = twins_in(best.model, step).into_iter();
         let (narrower, others): (Vec<_>, Vec<_>) =
             twins.partition(|(twin, _)| is_narrower(twin, place));
+        let mut taken = None;
         for (others, most) in [
             (others, f64::INFINITY),
             // At one side it also stands for whatever else makes the sides differ, while that is missing.
             (narrower, criteria.missing.above_floor * floor),
         ] {
-            if let Some(other) = best.takes_below(others, |_| better, most)? {
-                step.added = Some(other.clone());
+            taken = best.takes_below(others, |_| better, most)?.cloned();
+            if taken.is_some() {
                 break;
             }
         }
+        step.added = taken.or_else(|| step.added.take());
     }
     Ok(())
 }
 
-/// The models with a [twin](twins) in place of the effect of a `step`.
-fn twins_in<'d>(
-    model: &Model,
-    step: &ImprovementStep,
-    diagnoses: &'d [Diagnosis],
-) -> Vec<(&'d EffectAt, Model)> {
+/// The models with what the data could not tell from the effect of a `step` in its place.
+fn twins_in<'s>(model: &Model, step: &'s ImprovementStep) -> Vec<(&'s EffectAt, Model)> {
     let Some(place) = step.added.as_ref() else {
         return Vec::new();
     };
-    let twins = twins(step, diagnoses).into_iter();
+    let twins = step.twins.iter().filter(|twin| *twin != place);
     let models = twins.filter_map(|twin| Some((twin, exchanged(model, place, twin)?)));
     models.collect()
+}
+
+/// Whether the last of the `diagnoses` did not name the effect of a `step`: that has just compared it with its twins.
+fn is_earlier(step: &ImprovementStep, diagnoses: &[Diagnosis]) -> bool {
+    step.round.is_none_or(|round| round + 1 < diagnoses.len())
 }
 
 /// Whether an effect is another one at fewer of its places.
@@ -284,7 +287,7 @@ pub(crate) fn still_open(
         .iter()
         .enumerate()
         .flat_map(|(index, step)| {
-            let twins = twins_in(model, step, diagnoses).into_iter();
+            let twins = twins_in(model, step).into_iter();
             twins.map(move |(twin, exchanged)| (index, twin, exchanged))
         })
         .collect();
@@ -339,15 +342,6 @@ fn has_the_effects_of(model: &Model, other: &Model) -> bool {
         model.effects.iter().map(of).collect()
     };
     effects(model) == effects(other) && free(model) == free(other)
-}
-
-/// What the data could not tell from the effect of a step when it was added.
-fn twins<'a>(step: &ImprovementStep, diagnoses: &'a [Diagnosis]) -> Vec<&'a EffectAt> {
-    let named = (step.round).and_then(|round| diagnoses.get(round)?.candidates.first());
-    let class = named
-        .iter()
-        .flat_map(|n| std::iter::once(&n.place).chain(&n.indistinguishable_from));
-    class.filter(|p| step.added.as_ref() != Some(p)).collect()
 }
 
 /// The model with the effect of `other` in place of that of `place`. Parameters of the same name keep their

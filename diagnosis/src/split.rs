@@ -7,6 +7,7 @@ use loopsight_model::model::Model;
 use loopsight_model::registry;
 
 use crate::compare::free_run_error;
+use crate::conclusion::{Diagnosis, Explanation};
 use crate::effect_at::EffectAt;
 use crate::error::FitError;
 use crate::improvement::ImprovementStep;
@@ -25,6 +26,7 @@ struct Split {
 pub(crate) fn split(
     best: &mut Refined<'_>,
     steps: &mut Vec<ImprovementStep>,
+    diagnoses: &[Diagnosis],
 ) -> Result<(), FitError> {
     let close = best.work.criteria().choice.close;
     let mut index = 0;
@@ -34,7 +36,7 @@ pub(crate) fn split(
             None => Vec::new(),
         };
         if let Some(Split { first, second }) = best.takes(candidates, |_| close)? {
-            divide(best, steps, index, [first, second])?;
+            divide(best, steps, index, [first, second], diagnoses)?;
         }
         index += 1;
     }
@@ -82,6 +84,7 @@ fn divide(
     steps: &mut Vec<ImprovementStep>,
     index: usize,
     effects: [&str; 2],
+    diagnoses: &[Diagnosis],
 ) -> Result<(), FitError> {
     let step = &steps[index];
     let Some(place) = step.added.clone() else {
@@ -91,36 +94,67 @@ fn divide(
         effect: effect.to_owned(),
         at: place.at.clone(),
     });
-    let known = steps[..index]
-        .iter()
-        .any(|s| s.added.as_ref() == Some(&first));
-    let of = |added: EffectAt| ImprovementStep {
-        added: Some(added),
-        entries: None,
+    let diagnosis = step.round.and_then(|round| diagnoses.get(round));
+    let better = best.work.criteria().improve.better;
+    let mut both = ImprovementStep {
+        twins: diagnosis.map_or(Vec::new(), |diagnosis| as_good(&second, diagnosis, better)),
+        added: Some(second),
         round: None,
-        nrmse_fit: step.nrmse_fit,
-        nrmse_test: step.nrmse_test,
-        still_open: Vec::new(),
+        ..step.clone()
     };
-    let second = of(second);
-    if known {
-        steps[index] = second;
+    let later = &steps[index + 1..];
+    measure(&mut both, best, later)?;
+    let known = |s: &ImprovementStep| s.added.as_ref() == Some(&first);
+    if steps[..index].iter().any(known) {
+        steps[index] = both;
         return Ok(());
     }
-    let mut first = of(first);
-    first.round = step.round;
-    let later = steps[index + 1..].iter().chain([&second]);
-    let alone = later
+    let candidates = diagnosis.map_or(&[][..], |diagnosis| &diagnosis.candidates);
+    let named = candidates.iter().find(|named| named.place == first);
+    let mut alone = ImprovementStep {
+        added: Some(first),
+        ..step.clone()
+    };
+    if let Some(named) = named {
+        (alone.nrmse_fit, alone.nrmse_test) = (named.nrmse_fit, named.nrmse);
+    } else {
+        let others: Vec<ImprovementStep> = later.iter().chain([&both]).cloned().collect();
+        measure(&mut alone, best, &others)?;
+    }
+    steps.splice(index..=index, [alone, both]);
+    Ok(())
+}
+
+/// What does about as well as the effect at `place` by itself, where a diagnosis has it among its explanations.
+fn as_good(place: &EffectAt, diagnosis: &Diagnosis, better: f64) -> Vec<EffectAt> {
+    let candidates = &diagnosis.candidates;
+    let Some(own) = candidates.iter().find(|named| named.place == *place) else {
+        return Vec::new();
+    };
+    let near = |other: &&Explanation| {
+        better * other.nrmse <= own.nrmse && better * own.nrmse <= other.nrmse
+    };
+    (candidates.iter().filter(near))
+        .map(|other| other.place.clone())
+        .collect()
+}
+
+/// Puts into a `step` the errors of the model without the effects of `others`, where that can be fitted.
+fn measure(
+    step: &mut ImprovementStep,
+    best: &Refined<'_>,
+    others: &[ImprovementStep],
+) -> Result<(), FitError> {
+    let silent = best.work.silently();
+    let without = (others.iter())
         .filter(|step| step.added.is_some())
         .try_fold(best.model.clone(), |model, step| without_step(&model, step));
-    let silent = best.work.silently();
-    if let Some(alone) = alone
-        && let Ok((error, fitted)) = refitted(&alone, best.measurements, &silent)
+    if let Some(without) = without
+        && let Ok((error, fitted)) = refitted(&without, best.measurements, &silent)
     {
         let runs = Measurements::new(best.measurements.runs);
-        first.nrmse_fit = free_run_error(&fitted, &runs, &silent)?;
-        first.nrmse_test = error;
+        step.nrmse_fit = free_run_error(&fitted, &runs, &silent)?;
+        step.nrmse_test = error;
     }
-    steps.splice(index..=index, [first, second]);
     Ok(())
 }

@@ -156,6 +156,7 @@ pub(crate) fn improvement(last: Conclusion) -> Improvement {
     let step = |added, nrmse_fit, nrmse_test| ImprovementStep {
         round: Some(0),
         entries: None,
+        twins: Vec::new(),
         still_open: Vec::new(),
         added,
         nrmse_fit,
