@@ -2,13 +2,13 @@
 //!
 //! A [`Unit`] is a factor and a [`Dimension`]: *SI value = factor × value*. The radian keeps an
 //! exponent of its own, so that `rad/s` and `1/s` differ: a column in hertz is not taken for an
-//! angular velocity. Turns (`rev`, `rot`, `deg`, `rpm`) are angles. A `count` is a plain number, since
+//! angular velocity. Turns (`rev`, `rot`, `deg`, and those of `rpm`, `rps`, `dps`) are angles. A `count` is a plain number, since
 //! the angle of one count depends on the encoder.
 //!
 //! ## Grammar
 //!
 //! * symbols `m g s A V N Nm J W Hz Ohm Ω H F C Pa K rad`, each with the prefixes
-//!   `p n u µ m c k M G`; and without prefix `min h deg ° rev rot rotation(s) rpm count(s)
+//!   `p n u µ m c k M G`; and without prefix `min h deg ° rev rot rotation(s) rpm rps dps mps kph kmh mph count(s)
 //!   percent % in ft 1`; names as WPILib SysId spells them (`Meters`, `Feet`, `Inches`,
 //!   `Radians`, `Degrees`, `Rotations`), in any case;
 //! * products by a space, `*`, `·`, `.` or `_`; `/` divides by the *one* factor that follows
