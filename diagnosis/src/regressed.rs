@@ -1,9 +1,8 @@
 //! Candidates by regressions, away from where the fit of the plain model ended.
 
-use loopsight_model::model::{Model, pseudo_inverse};
+use loopsight_model::model::Model;
 use loopsight_model::regression::Scheme;
 use loopsight_model::run::Run;
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::arrive::SPANS;
@@ -12,7 +11,7 @@ use crate::conclusion::Explanation;
 use crate::judge::nrmse;
 use crate::prediction::{InitialStates, Solution};
 use crate::progress::Work;
-use crate::regression::{Regression, for_each_row};
+use crate::regression::{Regression, normal_equations};
 use crate::search::{Search, least};
 use crate::speeds::Speeds;
 use crate::starts::first_starts;
@@ -161,43 +160,17 @@ fn regress(
         let period = runs.first()?.median_period().max(span);
         let mut regression =
             Regression::with_effects_of_all(&speeds.model, Scheme::default(), period).ok()?;
-        let mut sums: Vec<(DMatrix<f64>, DVector<f64>, f64)> = (0..regression.len())
-            .map(|row| {
-                let n = regression.parameters(row).len();
-                (DMatrix::zeros(n, n), DVector::zeros(n), 0.0)
-            })
-            .collect();
-        for_each_row(
-            &mut regression,
-            &speeds,
-            runs,
-            span,
-            work,
-            |row, _, phi, y| {
-                let (gram, right, square) = &mut sums[row];
-                let phi = DVector::from_column_slice(phi);
-                gram.ger(1.0, &phi, &phi, 1.0);
-                right.axpy(y, &phi, 1.0);
-                *square += y * y;
-            },
-        )
-        .ok()?;
+        let normals = normal_equations(&mut regression, &speeds, runs, span, work).ok()?;
         left.clear();
         let mut told = vec![0.0; values.len()];
-        for (row, (gram, right, square)) in sums.iter().enumerate() {
-            let mut theta = pseudo_inverse(gram)? * right;
-            for (k, j) in regression.parameters(row).iter().enumerate() {
-                theta[k] = linear.parameters[*j].declaration.nearest(theta[k]);
-                if gram[(k, k)] >= told[*j] {
-                    told[*j] = gram[(k, k)];
-                    values[*j] = theta[k];
-                }
+        for (row, normal) in normals.iter().enumerate() {
+            let parameters = regression.parameters(row);
+            let mut theta = normal.solution()?;
+            for (value, j) in theta.iter_mut().zip(parameters) {
+                *value = linear.parameters[*j].declaration.nearest(*value);
             }
-            let fitted = theta.dot(&(gram * &theta));
-            left.push((
-                regression.state(row),
-                square - 2.0 * theta.dot(right) + fitted,
-            ));
+            normal.tell(&theta, parameters, &mut told, &mut values);
+            left.push((regression.state(row), normal.left(&theta)));
         }
     }
     let all = values.iter().all(|value| value.is_finite());

@@ -84,46 +84,92 @@ pub(crate) fn batch(
     }
     let speeds = Speeds::of(&linear);
     let mut regression = Regression::new(&speeds.model, scheme)?;
-    let mut grams: Vec<(DMatrix<f64>, DVector<f64>)> = (0..regression.len())
-        .map(|row| {
-            let n = regression.parameters(row).len();
-            (DMatrix::zeros(n, n), DVector::zeros(n))
-        })
-        .collect();
-    for_each_row(
-        &mut regression,
-        &speeds,
-        runs,
-        span,
-        work,
-        |row, _, phi, y| {
-            let (gram, right) = &mut grams[row];
-            for (i, a) in phi.iter().enumerate() {
-                right[i] += a * y;
-                for (j, b) in phi.iter().enumerate() {
-                    gram[(i, j)] += a * b;
-                }
-            }
-        },
-    )?;
+    let normals = normal_equations(&mut regression, &speeds, runs, span, work)?;
     let mut values: Vec<f64> = (linear.parameters.iter().zip(0..))
         .map(|(p, index)| {
             let known = p.value.or(linear.tie(index).map(|_| 0.0));
             known.unwrap_or_else(|| p.declaration.nearest(p.scale()))
         })
         .collect();
-    // A parameter that is tied to another one's row is in both. The row that determines it better counts.
     let mut told = vec![0.0; values.len()];
-    for (row, (gram, right)) in grams.iter().enumerate() {
-        if let Some(inverse) = pseudo_inverse(gram) {
-            let theta = inverse * right;
-            for (k, j) in regression.parameters(row).iter().enumerate() {
-                if gram[(k, k)] >= told[*j] {
-                    told[*j] = gram[(k, k)];
-                    values[*j] = theta[k];
-                }
-            }
+    for (row, normal) in normals.iter().enumerate() {
+        if let Some(theta) = normal.solution() {
+            normal.tell(&theta, regression.parameters(row), &mut told, &mut values);
         }
     }
     Ok(values)
+}
+
+/// The normal equations of the regression of a row.
+pub(crate) struct Normal {
+    /// Sum of φφᵀ.
+    gram: DMatrix<f64>,
+    /// Sum of φy.
+    right: DVector<f64>,
+    /// Sum of y².
+    square: f64,
+}
+
+impl Normal {
+    fn zeros(parameters: usize) -> Self {
+        Self {
+            gram: DMatrix::zeros(parameters, parameters),
+            right: DVector::zeros(parameters),
+            square: 0.0,
+        }
+    }
+
+    fn add(&mut self, phi: &[f64], y: f64) {
+        for (i, a) in phi.iter().enumerate() {
+            self.right[i] += a * y;
+            for (j, b) in phi.iter().enumerate() {
+                self.gram[(i, j)] += a * b;
+            }
+        }
+        self.square += y * y;
+    }
+
+    /// The values of least norm that leave least.
+    pub(crate) fn solution(&self) -> Option<DVector<f64>> {
+        Some(pseudo_inverse(&self.gram)? * &self.right)
+    }
+
+    /// Sum of squares that the values `theta` leave.
+    pub(crate) fn left(&self, theta: &DVector<f64>) -> f64 {
+        self.square - 2.0 * theta.dot(&self.right) + theta.dot(&(&self.gram * theta))
+    }
+
+    /// Puts `theta` into the `values` of the `parameters` of this row. A parameter that is tied to another one's row is in both.
+    /// The row that determines it better counts: `told` is how well each is determined so far.
+    pub(crate) fn tell(
+        &self,
+        theta: &DVector<f64>,
+        parameters: &[usize],
+        told: &mut [f64],
+        values: &mut [f64],
+    ) {
+        for (k, j) in parameters.iter().enumerate() {
+            if self.gram[(k, k)] >= told[*j] {
+                told[*j] = self.gram[(k, k)];
+                values[*j] = theta[k];
+            }
+        }
+    }
+}
+
+/// The normal equations of each row of a `regression`, see [`for_each_row`].
+pub(crate) fn normal_equations(
+    regression: &mut Regression,
+    speeds: &Speeds,
+    runs: &[Run],
+    span: f64,
+    work: &Work<'_>,
+) -> Result<Vec<Normal>, FitError> {
+    let mut normals: Vec<Normal> = (0..regression.len())
+        .map(|row| Normal::zeros(regression.parameters(row).len()))
+        .collect();
+    for_each_row(regression, speeds, runs, span, work, |row, _, phi, y| {
+        normals[row].add(phi, y);
+    })?;
+    Ok(normals)
 }
