@@ -3,7 +3,7 @@
 use crate::declare_effect;
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
-use super::first_order;
+use super::{LONGEST_S, first_order};
 
 /// Actuator lag: the command takes effect gradually.
 ///
@@ -42,7 +42,7 @@ impl Effect for ActuatorLag {
         example: "[[effect]]\n[effect.actuator_lag]\nat = [\"input.right\", \"input.left\"]\nlag = 0.03\n",
         places: &[PlaceKind::Input],
         parameters: &[Parameter::new("lag", "T", "s", "time constant")
-            .within(0.0, 3600.0)
+            .within(0.0, LONGEST_S)
             .or(0.0)
             .nonlinear()
             .scaled(0.02)],

@@ -3,6 +3,8 @@
 use crate::declare_effect;
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
+use super::LONGEST_S;
+
 /// Input delay: the command arrives later than it was logged.
 ///
 /// ```text
@@ -34,7 +36,7 @@ impl Effect for InputDelay {
         places: &[PlaceKind::Input],
         parameters: &[
             Parameter::new("delay", "τ", "s", "time from the log to the actuator")
-                .within(0.0, 3600.0)
+                .within(0.0, LONGEST_S)
                 .or(0.0)
                 .nonlinear()
                 .scaled(0.01),

@@ -90,3 +90,6 @@ pub use viscous_friction::ViscousFriction;
 pub use wheel_radius_mismatch::WheelRadiusMismatch;
 pub use wheel_slip::WheelSlip;
 pub use winding_heating::WindingHeating;
+
+/// The longest delay, lag or window, s: an hour, for the sensors of slow processes.
+const LONGEST_S: f64 = 3600.0;

@@ -3,6 +3,8 @@
 use crate::declare_effect;
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
+use super::LONGEST_S;
+
 /// Sensor delay: the number in the log is an old one.
 ///
 /// ```text
@@ -34,7 +36,7 @@ impl Effect for SensorDelay {
         places: &[PlaceKind::Output],
         parameters: &[
             Parameter::new("delay", "τ", "s", "age of the measurement when stamped")
-                .within(0.0, 3600.0)
+                .within(0.0, LONGEST_S)
                 .or(0.0)
                 .nonlinear()
                 .scaled(0.01),

@@ -3,7 +3,7 @@
 use crate::declare_effect;
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
-use super::first_order;
+use super::{LONGEST_S, first_order};
 
 /// Sensor lag: the measurement follows the signal gradually.
 ///
@@ -42,7 +42,7 @@ impl Effect for SensorLag {
         example: "[[effect]]\n[effect.sensor_lag]\nat = [\"sensor.linear_velocity\", \"sensor.angular_velocity\"]\nlag = 0.03\n",
         places: &[PlaceKind::Output],
         parameters: &[Parameter::new("lag", "T", "s", "time constant")
-            .within(0.0, 3600.0)
+            .within(0.0, LONGEST_S)
             .or(0.0)
             .nonlinear()
             .scaled(0.02)],

@@ -3,6 +3,8 @@
 use crate::declare_effect;
 use loopsight_core::{Effect, EffectMeta, Parameter, PlaceKind, Reading, Real};
 
+use super::LONGEST_S;
+
 /// Sensor window: the sensor reports a moving mean.
 ///
 /// ```text
@@ -39,7 +41,7 @@ impl Effect for SensorWindow {
         places: &[PlaceKind::Output],
         parameters: &[
             Parameter::new("window", "W", "s", "length of the moving mean")
-                .within(0.0, 3600.0)
+                .within(0.0, LONGEST_S)
                 .or(0.0)
                 .nonlinear()
                 .scaled(0.02),
