@@ -135,8 +135,23 @@ pub(crate) fn free_run_error(
     work: &Work<'_>,
 ) -> Result<f64, CompareError> {
     check(model, measurements)?;
-    let (runs, Solution { values, states }) = started(model, measurements.runs, work)?;
-    let predicted = for_each_run(&runs, &states, |run, x0| {
+    let runs = attach_observer(model, &model.values(), measurements.runs, work)?;
+    error_over(model, &runs, work)
+}
+
+/// The error of the free run over `runs` as they are: corrected by the observer that they have, if any.
+///
+/// # Errors
+///
+/// [`CompareError`] when the simulation diverges, and when the work was cancelled.
+pub(crate) fn error_over(
+    model: &Model,
+    runs: &[Run],
+    work: &Work<'_>,
+) -> Result<f64, CompareError> {
+    let values = model.values();
+    let states = InitialStates::estimate(model, &values, runs, work)?.states;
+    let predicted = for_each_run(runs, &states, |run, x0| {
         predict(model, &values, x0, run, work)
     })?;
     let width = model.measured.len();

@@ -61,6 +61,7 @@ pub fn diagnose(
         worth: 0.0,
         discover: Discover::Never,
         force: true,
+        unaided: Unaided::Sought,
     };
     let mut diagnosis = diagnose_for(model, measurements, aim, work)?;
     match pair(&diagnosis, measurements, aim, work) {
@@ -79,6 +80,8 @@ pub(crate) struct Aim {
     pub(crate) discover: Discover,
     /// Whether it says what force is missing where no effect explains the rest.
     pub(crate) force: bool,
+    /// Whether it first looks for values with which the model needs no observer.
+    pub(crate) unaided: Unaided,
 }
 
 /// When an expression for the residual force is a candidate.
@@ -232,7 +235,7 @@ fn steps(
         model,
         read.runs(),
         &FitSettings::default(),
-        Unaided::Sought,
+        aim.unaided,
         &silent,
     )?;
     let (model, runs) = (&*prepared.model, &*prepared.runs);

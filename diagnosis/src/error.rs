@@ -108,6 +108,13 @@ pub enum FitError {
     Cancelled(#[from] Cancelled),
 }
 
+impl FitError {
+    /// Whether the free run of the model diverges.
+    pub(crate) fn is_divergence(&self) -> bool {
+        matches!(self, Self::Compare(CompareError::Diverged { .. }))
+    }
+}
+
 impl From<CompareError> for FitError {
     fn from(error: CompareError) -> Self {
         match error {

@@ -7,6 +7,7 @@ use crate::compare::{compare, free_run_error};
 use crate::error::{CompareError, FitError};
 use crate::fitted::Fit;
 use crate::measurements::Measurements;
+use crate::output_error::Unaided;
 use crate::progress::{Cancelled, Work};
 use crate::settings::{FitSettings, Method};
 use crate::{output_error, rls};
@@ -25,6 +26,17 @@ pub fn fit(
     settings: &FitSettings,
     work: &Work<'_>,
 ) -> Result<Fit, FitError> {
+    fit_for(model, measurements, settings, Unaided::Sought, work)
+}
+
+/// As [`fit`], where it may be known whether the model needs an observer.
+pub(crate) fn fit_for(
+    model: &Model,
+    measurements: &Measurements<'_>,
+    settings: &FitSettings,
+    unaided: Unaided,
+    work: &Work<'_>,
+) -> Result<Fit, FitError> {
     let runs = measurements.runs;
     check(model, runs)?;
     measurements.check(model)?;
@@ -36,7 +48,7 @@ pub fn fit(
         || free_run_error(model, &fitted_to, &work.silently()),
         || match settings.method {
             Method::Rls => rls::fit(model, runs, settings, work),
-            Method::OutputError => output_error::fit(model, runs, settings, work),
+            Method::OutputError => output_error::fit(model, runs, settings, unaided, work),
         },
     );
     let before = match before {

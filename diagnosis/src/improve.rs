@@ -4,18 +4,21 @@ use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::Criteria;
 use crate::diagnose::{Aim, Discover, diagnose_for};
 use crate::early::Finding;
-use crate::error::{CompareError, FitError};
+use crate::error::FitError;
 use crate::estimate::stands_in;
-use crate::fit::fit;
+use crate::fit::fit_for;
 use crate::fitted::Fit;
 use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
-use crate::pairs::{names_a_stand_in, pair};
+use crate::output_error::Unaided;
+use crate::pairs::pair;
 use crate::progress::{Cancelled, Work};
 use crate::refine::{
     blurs, estimated, is_mostly_open, is_undetermined, refine, still_open, without_step,
 };
 use crate::settings::{FitSettings, ImproveSettings, Method};
+use crate::split::second_anew;
+use crate::worth::worth_adding;
 use loopsight_model::model::Model;
 
 /// Repeats [`diagnose`](crate::diagnose()), adding what it finds missing, until it finds nothing more.
@@ -65,7 +68,7 @@ fn improve_with(
             Some(diagnosis) => diagnosis,
             None => match state.diagnose(measurements, work) {
                 // A step with which the free run diverges was none.
-                Err(error) if is_divergence(&error) && state.take_back() => {
+                Err(error) if error.is_divergence() && state.take_back() => {
                     break Conclusion::UnknownEffect;
                 }
                 done => done?,
@@ -95,49 +98,20 @@ fn improve_with(
             Ok(best) => best,
             Err(verdict) => break verdict,
         };
+        let before = state.steps.clone();
         match state.add(best, round, measurements, work) {
             Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
             // It is another name for what the model has, so nothing more is named.
             Ok(false) => break Conclusion::NothingMissing,
-            done => done?,
+            Ok(true) => {}
+            Err(error) => return Err(error),
+        }
+        known = match state.second_anew(&before, round + 1, measurements, work) {
+            Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
+            found => found?,
         };
     };
     state.finish(verdict, measurements, work)
-}
-
-/// What the diagnosis of a `round` names, or the verdict where that is not worth adding.
-fn worth_adding(
-    diagnosis: &Diagnosis,
-    round: usize,
-    criteria: &Criteria,
-) -> Result<Explanation, Conclusion> {
-    let Criteria {
-        improve, missing, ..
-    } = criteria;
-    let best = match (&diagnosis.missing, diagnosis.candidates.first()) {
-        (Some(_), Some(best)) if round < improve.most => best,
-        _ => return Err(diagnosis.verdict),
-    };
-    let (before, floor) = (diagnosis.nominal.nrmse, diagnosis.floor.nrmse);
-    let fell_to = best.nrmse / before;
-    // At the floor a further effect explains noise, or how the model is computed. What is late shows in the steps, which are
-    // mostly in what was fitted: where much more than noise is left there, the model is not at the floor.
-    let complete = round > 0
-        && before < missing.complete * floor
-        && diagnosis.nominal_fit <= missing.above_floor * floor;
-    if complete && fell_to >= improve.better {
-        return Err(Conclusion::NothingMissing);
-    }
-    // Something is missing, but hardly this.
-    if names_a_stand_in(diagnosis, criteria) {
-        return Err(Conclusion::UnknownEffect);
-    }
-    Ok(best.clone())
-}
-
-/// Whether work failed because the free run of the model diverges.
-fn is_divergence(error: &FitError) -> bool {
-    matches!(error, FitError::Compare(CompareError::Diverged { .. }))
 }
 
 /// An improvement in progress.
@@ -168,6 +142,12 @@ impl State {
         }
     }
 
+    /// Whether a fit looks for values with which the model needs no observer: not where it needed one in the last diagnosis.
+    fn unaided(&self) -> Unaided {
+        let observer = self.diagnoses.last().and_then(|d| d.observer.as_ref());
+        Unaided::Sought.after(observer)
+    }
+
     /// What the next diagnosis is for.
     fn aim(&self, work: &Work<'_>) -> Aim {
         let first = self.diagnoses.first().map(|d| d.nominal.nrmse);
@@ -176,6 +156,7 @@ impl State {
             worth: first.map_or(0.0, |nrmse| worth * nrmse),
             discover: self.discover,
             force: true,
+            unaided: self.unaided(),
         }
     }
 
@@ -188,7 +169,8 @@ impl State {
         let round = self.diagnoses.len();
         let aim = self.aim(work);
         let settings = FitSettings::default();
-        let last = || fit(&self.present, measurements, &settings, &work.silently());
+        let (unaided, silent) = (aim.unaided, work.silently());
+        let last = || fit_for(&self.present, measurements, &settings, unaided, &silent);
         let (diagnosis, fitted) = rayon::join(
             || diagnose_for(&self.present, measurements, aim, &work.in_round(round)),
             || self.is_complete(work.criteria()).then(last),
@@ -272,6 +254,27 @@ impl State {
         Ok(stays || !self.take_back())
     }
 
+    /// Takes the second back of two steps that one was made into, where another effect that is worth adding does better. Then that
+    /// diagnosis is the next one.
+    fn second_anew(
+        &mut self,
+        before: &[ImprovementStep],
+        round: usize,
+        measurements: &Measurements<'_>,
+        work: &Work<'_>,
+    ) -> Result<Option<Diagnosis>, FitError> {
+        let (aim, now) = (self.aim(work), work.in_round(round));
+        let found = second_anew(&self.present, &self.steps, before, aim, measurements, &now)?;
+        let is_added = |d: &Diagnosis| worth_adding(d, round, work.criteria()).is_ok();
+        let found = found.filter(|(_, _, diagnosis)| is_added(diagnosis));
+        Ok(found.map(|(remain, without, diagnosis)| {
+            self.steps.truncate(remain);
+            (self.present, self.fitted) = (without, None);
+            self.tried.clear();
+            diagnosis
+        }))
+    }
+
     /// Says of each step what the data still cannot tell from its effect in the finished `model`.
     fn tell_open(
         &mut self,
@@ -306,8 +309,10 @@ impl State {
         let floor = self.diagnoses.last().map_or(0.0, |d| d.floor.nrmse);
         let mut present = loop {
             let known = self.fitted.take().map(Ok);
-            match known.unwrap_or_else(|| fit(&self.present, measurements, settings, work)) {
-                Err(error) if is_divergence(&error) && self.take_back() => {}
+            match known.unwrap_or_else(|| {
+                fit_for(&self.present, measurements, settings, self.unaided(), work)
+            }) {
+                Err(error) if error.is_divergence() && self.take_back() => {}
                 done => break done?,
             }
         };
@@ -330,7 +335,7 @@ impl State {
             let Some((without, steps)) = self.without_last(&present.model) else {
                 return Ok(present);
             };
-            let alone = fit(&without, measurements, settings, work)?;
+            let alone = fit_for(&without, measurements, settings, self.unaided(), work)?;
             if !idle && !blurs(&alone, &present, missing.undetermined, improve.blurs) {
                 return Ok(present);
             }

@@ -159,6 +159,7 @@ mod untried;
 mod where_it_fails;
 mod whole;
 mod window;
+mod worth;
 
 pub use arrive::{Convergence, Tried};
 pub use compare::{Comparison, RunTrace, SignalTrace, compare};

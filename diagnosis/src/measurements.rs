@@ -61,9 +61,4 @@ impl<'a> Measurements<'a> {
         }
         Ok(())
     }
-
-    /// The validation runs where there are any, else those to fit to.
-    pub(crate) fn judging(&self) -> &'a [Run] {
-        self.test.unwrap_or(self.runs)
-    }
 }

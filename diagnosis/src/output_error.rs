@@ -12,7 +12,7 @@ use crate::fitted::Fit;
 use crate::gram::gram;
 use crate::narrow::narrowed;
 use crate::noise;
-use crate::observer::{attach_observer_for, growth};
+use crate::observer::{Correction, attach_observer_for, growth};
 use crate::prediction::InitialStates;
 use crate::problem::{Problem, declared};
 use crate::progress::{Cancelled, Work};
@@ -43,9 +43,10 @@ pub(crate) fn fit(
     model: &Model,
     runs: &[Run],
     settings: &FitSettings,
+    unaided: Unaided,
     work: &Work<'_>,
 ) -> Result<Fit, FitError> {
-    let prepared = prepare(model, runs, settings, Unaided::Sought, work)?;
+    let prepared = prepare(model, runs, settings, unaided, work)?;
     let mut problem = Problem::new(&prepared.model, &prepared.runs, work.clone())?;
     match in_two_passes(&mut problem, settings) {
         Err(FitError::Cancelled(cancelled)) => {
@@ -111,6 +112,13 @@ pub(crate) enum Unaided {
     Sought,
     /// A fit has found what it needs.
     Known,
+}
+
+impl Unaided {
+    /// The same once a fit has found that an observer is needed, or not.
+    pub(crate) fn after(self, observer: Option<&Correction>) -> Self {
+        observer.map_or(self, |_| Self::Known)
+    }
 }
 
 /// A model and recordings, ready for a fit.

@@ -8,9 +8,9 @@ use crate::conclusion::{Conclusion, Diagnosis, Explanation};
 use crate::criteria::Criteria;
 use crate::diagnose::{Aim, Discover, diagnose_for};
 use crate::error::FitError;
-use crate::estimate::stands_in;
 use crate::measurements::Measurements;
 use crate::progress::{Cancelled, Work};
+use crate::worth::names_a_stand_in;
 
 /// What explains together.
 pub(crate) struct Pair {
@@ -40,6 +40,7 @@ pub(crate) fn pair(
     let aim = Aim {
         discover: Discover::Never,
         force: false,
+        unaided: aim.unaided.after(diagnosis.observer.as_ref()),
         ..aim
     };
     let mut best: Option<(f64, Pair)> = None;
@@ -60,18 +61,6 @@ pub(crate) fn pair(
         best = Some((left, Pair { first, second }));
     }
     Ok(best.map(|(_, pair)| pair))
-}
-
-/// Whether what the diagnosis names explains no large part, and only with a parameter at the end of where it is searched.
-pub(crate) fn names_a_stand_in(diagnosis: &Diagnosis, criteria: &Criteria) -> bool {
-    let named = diagnosis
-        .candidates
-        .first()
-        .filter(|_| diagnosis.missing.is_some());
-    named.is_some_and(|best| {
-        best.nrmse >= criteria.improve.worth_blurring * diagnosis.nominal.nrmse
-            && stands_in(best.parameters.values())
-    })
 }
 
 /// The explanations of a diagnosis to begin with: the best that do something, each another response of the machine.

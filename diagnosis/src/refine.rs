@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use loopsight_model::model::{Attached, Model, ModelParameter};
 use rayon::prelude::*;
 
-use crate::compare::free_run_error;
 use crate::conclusion::Diagnosis;
 use crate::effect_at::EffectAt;
 use crate::error::FitError;
@@ -14,7 +13,7 @@ use crate::fitted::Fit;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
 use crate::progress::Work;
-use crate::refined::{Refined, refitted};
+use crate::refined::{Alike, Refined};
 use crate::split::split;
 use crate::suited::smooth;
 
@@ -44,6 +43,9 @@ pub(crate) fn refine(
         return Ok(None);
     }
     simplified(&mut best, steps)?;
+    if is_named_before(steps) {
+        return Ok(None);
+    }
     split(&mut best, steps, diagnoses)?;
     let others = with_others(best.model, steps, diagnoses);
     best.try_all(&others)?;
@@ -104,6 +106,12 @@ fn needless(best: &mut Refined<'_>, steps: &mut Vec<ImprovementStep>) -> Result<
         steps.remove(index);
     }
     Ok(true)
+}
+
+/// Whether the last of `steps` adds what an earlier one has: it took the place of that one, and is no more than it.
+fn is_named_before(steps: &[ImprovementStep]) -> bool {
+    let last = steps.split_last();
+    last.is_some_and(|(last, earlier)| earlier.iter().any(|step| step.added == last.added))
 }
 
 /// Whether the log does not say how strong the effect of `step` is.
@@ -296,14 +304,14 @@ pub(crate) fn still_open(
         return Ok(open);
     }
     let silent = work.silently();
-    let judging = Measurements::new(measurements.judging());
-    let bar = match free_run_error(model, &judging, &silent).map_err(FitError::from) {
+    let alike = Alike::new(model, measurements, &silent)?;
+    let bar = match alike.error(model, &silent).map_err(FitError::from) {
         Err(FitError::Cancelled(cancelled)) => return Err(cancelled.into()),
         // Nothing can be told from a model whose free run diverges.
         Err(_) => return Ok(open),
         Ok(error) => error / work.criteria().improve.better,
     };
-    let leaves = |model: &Model| free_run_error(model, &judging, &silent);
+    let leaves = |model: &Model| alike.error(model, &silent);
     let good = |(index, twin, exchanged): &(usize, &EffectAt, Model)| {
         let same = |model: &Model| has_the_effects_of(model, exchanged);
         if let Some((error, _)) = tried.iter().find(|(_, model)| same(model)) {
@@ -312,7 +320,8 @@ pub(crate) fn still_open(
         let diagnosed = diagnosed(&steps[*index], diagnoses, twin).filter(|model| same(model));
         // One that a diagnosis fitted needs no other fit.
         diagnosed.is_some_and(|model| leaves(model).is_ok_and(|error| error <= bar))
-            || refitted(diagnosed.unwrap_or(exchanged), measurements, &silent)
+            || alike
+                .refitted(diagnosed.unwrap_or(exchanged), &silent)
                 .is_ok_and(|(error, _)| error <= bar)
     };
     let found: Vec<_> = candidates.into_par_iter().filter(good).collect();
@@ -409,4 +418,41 @@ fn sharper(model: &Model) -> Option<Model> {
         .and_then(|i| candidate.parameters[first + i].value)?;
     smooth(&mut candidate, count, 0.5 * width);
     Some(candidate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_that_became_an_earlier_one_is_no_further_step() {
+        let step = |added: Option<&str>| ImprovementStep {
+            added: added.map(|effect| EffectAt {
+                effect: effect.to_owned(),
+                at: vec!["shaft".to_owned()],
+            }),
+            entries: None,
+            round: Some(0),
+            nrmse_fit: 0.1,
+            nrmse_test: 0.1,
+            twins: Vec::new(),
+            still_open: Vec::new(),
+        };
+        let steps = |names: &[Option<&str>]| names.iter().map(|name| step(*name)).collect();
+        let is_named = |names: &[Option<&str>]| {
+            let steps: Vec<ImprovementStep> = steps(names);
+            is_named_before(&steps)
+        };
+        assert!(!is_named(&[None]));
+        assert!(!is_named(&[
+            None,
+            Some("coulomb_friction"),
+            Some("input_lead")
+        ]));
+        assert!(is_named(&[
+            None,
+            Some("coulomb_friction"),
+            Some("coulomb_friction")
+        ]));
+    }
 }

@@ -1,11 +1,15 @@
 //! A model, and corrections to it that are tried.
 
+use std::borrow::Cow;
+
 use loopsight_model::model::Model;
+use loopsight_model::run::Run;
 use rayon::prelude::*;
 
-use crate::compare::free_run_error;
-use crate::error::FitError;
+use crate::compare::{error_over, free_run_error};
+use crate::error::{CompareError, FitError};
 use crate::measurements::Measurements;
+use crate::observer::{Correction, attach_observer, attach_same_observer};
 use crate::output_error::{Unaided, fitted_values};
 use crate::progress::{Cancelled, Stage, Work};
 use crate::solve::Effort;
@@ -15,6 +19,8 @@ pub(crate) struct Refined<'a> {
     pub(crate) model: &'a mut Model,
     pub(crate) measurements: &'a Measurements<'a>,
     pub(crate) work: &'a Work<'a>,
+    /// What it and the others are refitted to, once one was.
+    alike: Option<Alike<'a>>,
     /// Its error after a short fit, once it was computed.
     error: Option<f64>,
     /// What was tried in its place.
@@ -42,6 +48,7 @@ impl<'a> Refined<'a> {
             model,
             measurements,
             work,
+            alike: None,
             error: None,
             tried: Vec::new(),
             changes: 0,
@@ -94,8 +101,12 @@ impl<'a> Refined<'a> {
         self.changes += new.len() as u64;
         self.work.tell(Stage::Refining, self.changes, self.changes);
         let silent = self.work.silently();
+        let alike = match self.alike.take() {
+            Some(alike) => alike,
+            None => Alike::new(self.model, self.measurements, &silent)?,
+        };
         let refit = |model: &Model| -> Result<_, Cancelled> {
-            match refitted(model, self.measurements, &silent) {
+            match alike.refitted(model, &silent) {
                 Err(FitError::Cancelled(cancelled)) => Err(cancelled),
                 found => Ok(found.ok()),
             }
@@ -104,8 +115,14 @@ impl<'a> Refined<'a> {
         let (now, tried) = rayon::join(
             || match known {
                 Some(now) => Ok(now),
-                // Any other model is better than one whose free run diverges.
-                None => refit(present).map(|found| found.map_or(f64::INFINITY, |(error, _)| error)),
+                None => match refit(present)? {
+                    Some((error, _)) => Ok(error),
+                    None => match alike.error(present, &silent) {
+                        Err(CompareError::Cancelled(cancelled)) => Err(cancelled),
+                        // Any other model is better than one whose free run diverges.
+                        found => Ok(found.unwrap_or(f64::INFINITY)),
+                    },
+                },
             },
             || {
                 let tried = new.into_par_iter().map(|begun| {
@@ -115,6 +132,7 @@ impl<'a> Refined<'a> {
                 tried.collect::<Result<Vec<Tried>, Cancelled>>()
             },
         );
+        self.alike = Some(alike);
         self.error = Some(now?);
         self.tried.extend(tried?);
         Ok(())
@@ -148,18 +166,72 @@ const CORRECTION: Effort = Effort {
     worth: None,
 };
 
-/// The error of a model after a short fit, and the fitted model.
-pub(crate) fn refitted(
-    model: &Model,
-    measurements: &Measurements<'_>,
-    work: &Work<'_>,
-) -> Result<(f64, Model), FitError> {
-    let begun = model.clone().with_steps_by_motion();
-    let mut fitted = fitted_values(&begun, measurements.runs, Unaided::Known, CORRECTION, work)?;
-    let judging = Measurements::new(measurements.judging());
-    let error = free_run_error(&fitted, &judging, work)?;
-    fitted.by_motion = false;
-    Ok((error, fitted))
+/// Recordings that models are refitted to, and judged on under the observer that one of them needs: an observer that corrects
+/// sooner leaves less, so that errors are only compared under the same.
+pub(crate) struct Alike<'a> {
+    /// Those to refit to, each model with the observer that it needs.
+    fitting: &'a [Run],
+    /// Those to judge on.
+    judging: &'a [Run],
+    /// Those to fit to, under one observer.
+    runs: Cow<'a, [Run]>,
+    /// The validation runs under it, where there are any.
+    test: Option<Cow<'a, [Run]>>,
+}
+
+impl<'a> Alike<'a> {
+    /// The `measurements` under the observer that `model` needs.
+    pub(crate) fn new(
+        model: &Model,
+        measurements: &Measurements<'a>,
+        work: &Work<'_>,
+    ) -> Result<Self, Cancelled> {
+        let fitting = measurements.runs;
+        let runs = attach_observer(model, &model.values(), fitting, work)?;
+        let test = measurements.test;
+        let test = test.map(|test| attach_same_observer(model, test, &runs, work));
+        let test = test.transpose()?;
+        Ok(Self {
+            fitting,
+            judging: measurements.test.unwrap_or(fitting),
+            runs,
+            test,
+        })
+    }
+
+    /// The error of a model on what it is judged on.
+    pub(crate) fn error(&self, model: &Model, work: &Work<'_>) -> Result<f64, CompareError> {
+        error_over(model, self.test.as_ref().unwrap_or(&self.runs), work)
+    }
+
+    /// That error, or what it leaves with no other observer than it needs itself, if that is more: a slow model that an observer
+    /// draws along does not stand by itself.
+    fn error_of(&self, model: &Model, work: &Work<'_>) -> Result<f64, CompareError> {
+        let error = self.error(model, work)?;
+        if Correction::of(&self.runs).is_none() {
+            return Ok(error);
+        }
+        let own = free_run_error(model, &Measurements::new(self.judging), work)?;
+        Ok(error.max(own))
+    }
+
+    /// The error of a model on what it is fitted to.
+    pub(crate) fn error_fit(&self, model: &Model, work: &Work<'_>) -> Result<f64, CompareError> {
+        error_over(model, &self.runs, work)
+    }
+
+    /// The error of a model after a short fit, and the fitted model.
+    pub(crate) fn refitted(
+        &self,
+        model: &Model,
+        work: &Work<'_>,
+    ) -> Result<(f64, Model), FitError> {
+        let begun = model.clone().with_steps_by_motion();
+        let mut fitted = fitted_values(&begun, self.fitting, Unaided::Known, CORRECTION, work)?;
+        let error = self.error_of(&fitted, work)?;
+        fitted.by_motion = false;
+        Ok((error, fitted))
+    }
 }
 
 #[cfg(test)]

@@ -6,14 +6,15 @@
 use loopsight_model::model::Model;
 use loopsight_model::registry;
 
-use crate::compare::free_run_error;
 use crate::conclusion::{Diagnosis, Explanation};
+use crate::diagnose::{Aim, diagnose_for};
 use crate::effect_at::EffectAt;
 use crate::error::FitError;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
+use crate::progress::Work;
 use crate::refine::{free, instances, without_step};
-use crate::refined::{Refined, refitted};
+use crate::refined::{Alike, Refined};
 
 /// Two effects in place of one: those of `first` and `second`, at its channels.
 struct Split {
@@ -125,6 +126,45 @@ fn divide(
     Ok(())
 }
 
+/// Of two steps that one was made into, nothing has compared the second with other effects. So the `model` without it and what was
+/// added after it is diagnosed, with `aim`: if what that names does better than all of these, then how many of the `steps` remain,
+/// their model and the diagnosis. That is judged once: those among the steps `before` the last round were.
+pub(crate) fn second_anew(
+    model: &Model,
+    steps: &[ImprovementStep],
+    before: &[ImprovementStep],
+    aim: Aim,
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<Option<(usize, Model, Diagnosis)>, FitError> {
+    let is_new = |second: &ImprovementStep| {
+        second.round.is_none() && before.iter().all(|step| step.added != second.added)
+    };
+    let (Some(remain), [.., last]) = (steps.iter().position(is_new), steps) else {
+        return Ok(None);
+    };
+    let (second, later) = (&steps[remain], steps[remain..].iter().rev());
+    let mut later = later.filter(|step| step.added.is_some());
+    let Some(without) = later.try_fold(model.clone(), |model, step| without_step(&model, step))
+    else {
+        return Ok(None);
+    };
+    let diagnosis = match diagnose_for(&without, measurements, aim, work) {
+        // Only all together lead anywhere.
+        Err(error) if error.is_divergence() => return Ok(None),
+        done => done?,
+    };
+    let candidates = &diagnosis.candidates;
+    let is_second = |c: &&Explanation| second.added.as_ref() == Some(&c.place);
+    let kept = candidates.iter().find(is_second);
+    let kept = kept.filter(|_| remain + 1 == steps.len());
+    let left = kept.map_or(last.nrmse_test, |kept| kept.nrmse);
+    let better = work.criteria().improve.better * left;
+    let named = candidates.first().filter(|_| diagnosis.missing.is_some());
+    let does_better = named.is_some_and(|named| named.nrmse < better);
+    Ok(does_better.then_some((remain, without, diagnosis)))
+}
+
 /// What does about as well as the effect at `place` by itself, where a diagnosis has it among its explanations.
 fn as_good(place: &EffectAt, diagnosis: &Diagnosis, better: f64) -> Vec<EffectAt> {
     let candidates = &diagnosis.candidates;
@@ -150,10 +190,10 @@ fn measure(
         .filter(|step| step.added.is_some())
         .try_fold(best.model.clone(), |model, step| without_step(&model, step));
     if let Some(without) = without
-        && let Ok((error, fitted)) = refitted(&without, best.measurements, &silent)
+        && let alike = Alike::new(&without, best.measurements, &silent)?
+        && let Ok((error, fitted)) = alike.refitted(&without, &silent)
     {
-        let runs = Measurements::new(best.measurements.runs);
-        step.nrmse_fit = free_run_error(&fitted, &runs, &silent)?;
+        step.nrmse_fit = alike.error_fit(&fitted, &silent)?;
         step.nrmse_test = error;
     }
     Ok(())
