@@ -268,7 +268,16 @@ impl<'a> Design<'a> {
             doubling: growth.doubling,
             stride,
             values: self.values.to_vec(),
+            slopes: self.slopes(),
         })))
+    }
+
+    /// Slopes of the sensors, by signal.
+    fn slopes(&self) -> Vec<f64> {
+        let simulator: Simulator<'_, f64> = Simulator::new(&self.model, self.values);
+        (0..self.model.measured.len())
+            .map(|signal| simulator.slope(signal))
+            .collect()
     }
 
     /// Uncertainty of the state before anything is known: many deviations of what is measured.
@@ -432,5 +441,57 @@ impl<'a> Design<'a> {
             });
         }
         Ok(Some(p))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use loopsight_model::simulate::free_run;
+    use loopsight_plants as _;
+
+    use super::*;
+    use crate::swing::swing;
+
+    /// Where a free run that starts off ends, with the sensor off by a factor, and the same factor in the recording.
+    fn corrected(scale: f64) -> f64 {
+        let text = "[plant.dc_axis]\nK_A = -0.001\nK_C = 8.0\n[log.measured.speed]\n";
+        let plain = Model::from_toml("axis.toml", text).unwrap().0;
+        let run = swing(&plain, 200);
+        let growth = Growth {
+            horizon: 0.3,
+            doubling: None,
+            observed: vec![0],
+        };
+        let quiet = Work::quiet();
+        let runs = [run];
+        let observed =
+            attach_observer_for(&plain, &plain.values(), &runs, &growth, &quiet).unwrap();
+        let observer = observed[0].observer().unwrap().clone();
+        let read = runs[0].measured().iter().map(|y| scale * y).collect();
+        let inputs = Rows::new(1, runs[0].inputs().to_vec());
+        let off = Run::new("", runs[0].time().to_vec(), inputs, Rows::new(1, read)).unwrap();
+        let off = off.with_observer(observer);
+        let mut scaled = plain
+            .with_effect("sensor_scale", &["sensor.speed"])
+            .unwrap();
+        scaled.parameters.last_mut().unwrap().value = Some(scale - 1.0);
+        let mut simulator = Simulator::new(&scaled, &scaled.values());
+        let mut last = 0.0;
+        free_run(&mut simulator, &[5.0, 0.0], &off, |k, y| {
+            if k == 20 {
+                last = y[0] / scale - runs[0].measured()[k];
+            }
+        });
+        last
+    }
+
+    #[test]
+    fn a_sensor_that_reads_too_much_corrects_no_more() {
+        let right = corrected(1.0);
+        assert!(right.abs() > 0.1, "an error of 5 still is {right}");
+        for scale in [0.5, 8.0, 1000.0] {
+            let left = corrected(scale);
+            assert!((left - right).abs() < 1e-9, "{left} for {right}");
+        }
     }
 }

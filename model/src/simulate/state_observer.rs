@@ -9,6 +9,10 @@
 ///
 /// `ŷ(k)` depends on the measurements before `k` only, so it stays a prediction. The gains are
 /// numbers: whoever differentiates a free run differentiates through the correction.
+///
+/// Where a sensor has another slope than the gains were made for, its difference counts in the slope of that. A sensor that reads
+/// eight times too much would correct eight times as much otherwise, and leave less of any model.
+///
 /// (D. G. Luenberger, 1971, "An introduction to observers", IEEE Transactions on Automatic Control
 /// 16, 596–602.)
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,6 +30,9 @@ pub struct StateObserver {
     pub values: Vec<f64>,
     /// Entries of `K`.
     pub stride: usize,
+    /// Slopes of the sensors that the gains were made for, by signal: what each reads for a signal of 1 more. Where it is not
+    /// given, the one of a sensor that reads right.
+    pub slopes: Vec<f64>,
 }
 
 impl StateObserver {
@@ -34,6 +41,11 @@ impl StateObserver {
         self.gains
             .get(k * self.stride..(k + 1) * self.stride)
             .unwrap_or(&[])
+    }
+
+    /// The slope of the sensor of a `signal` that the gains were made for.
+    pub fn slope(&self, signal: usize) -> f64 {
+        self.slopes.get(signal).copied().unwrap_or(1.0)
     }
 
     /// The gains of the samples `range` alone.
