@@ -98,7 +98,6 @@ fn improve_with(
             Ok(best) => best,
             Err(verdict) => break verdict,
         };
-        let before = state.steps.clone();
         match state.add(best, round, measurements, work) {
             Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
             // It is another name for what the model has, so nothing more is named.
@@ -106,7 +105,7 @@ fn improve_with(
             Ok(true) => {}
             Err(error) => return Err(error),
         }
-        known = match state.second_anew(&before, round + 1, measurements, work) {
+        known = match state.second_anew(round + 1, measurements, work) {
             Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
             found => found?,
         };
@@ -258,12 +257,12 @@ impl State {
     /// diagnosis is the next one.
     fn second_anew(
         &mut self,
-        before: &[ImprovementStep],
         round: usize,
         measurements: &Measurements<'_>,
         work: &Work<'_>,
     ) -> Result<Option<Diagnosis>, FitError> {
         let (aim, now) = (self.aim(work), work.in_round(round));
+        let before = self.before.as_ref().map_or(&[][..], |(_, steps)| steps);
         let found = second_anew(&self.present, &self.steps, before, aim, measurements, &now)?;
         let is_added = |d: &Diagnosis| worth_adding(d, round, work.criteria()).is_ok();
         let found = found.filter(|(_, _, diagnosis)| is_added(diagnosis));
@@ -423,7 +422,6 @@ mod tests {
     use loopsight_plants as _;
 
     use super::*;
-    use crate::effect_at::EffectAt;
 
     #[test]
     fn a_step_that_leads_nowhere_is_taken_back() {
@@ -432,18 +430,7 @@ mod tests {
                 format!("[plant.dc_axis]\nK_A = -2.0\nK_C = {level}\n[log.measured.speed]\n");
             Model::from_toml("axis.toml", &text).unwrap().0
         };
-        let step = |added: Option<&str>| ImprovementStep {
-            added: added.map(|effect| EffectAt {
-                effect: effect.to_owned(),
-                at: vec!["shaft".to_owned()],
-            }),
-            entries: None,
-            round: Some(0),
-            nrmse_fit: 0.1,
-            nrmse_test: 0.1,
-            twins: Vec::new(),
-            still_open: Vec::new(),
-        };
+        let step = ImprovementStep::at_shaft;
         let mut state = State::new(&of(8.0), Discover::Never);
         state.steps = vec![step(None), step(Some("coulomb_friction"))];
         let with = of(1e9).with_effect("coulomb_friction", &["shaft"]).unwrap();

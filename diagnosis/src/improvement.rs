@@ -31,6 +31,25 @@ pub struct ImprovementStep {
     pub still_open: Vec<EffectAt>,
 }
 
+#[cfg(test)]
+impl ImprovementStep {
+    /// One that adds this effect at a shaft in the first round, or nothing.
+    pub(crate) fn at_shaft(effect: Option<&str>) -> Self {
+        Self {
+            added: effect.map(|effect| EffectAt {
+                effect: effect.to_owned(),
+                at: vec!["shaft".to_owned()],
+            }),
+            entries: None,
+            round: Some(0),
+            nrmse_fit: 0.1,
+            nrmse_test: 0.1,
+            twins: Vec::new(),
+            still_open: Vec::new(),
+        }
+    }
+}
+
 /// The result of [`improve`](crate::improve()).
 #[derive(Debug, Serialize)]
 pub struct Improvement {

@@ -178,6 +178,12 @@ pub(crate) fn without_step(model: &Model, step: &ImprovementStep) -> Option<Mode
     (!instances.is_empty()).then(|| without(model, &instances))?
 }
 
+/// The model without the effects of some `steps`; none where it has none of one.
+pub(crate) fn without_steps(model: &Model, steps: &[ImprovementStep]) -> Option<Model> {
+    let mut added = steps.iter().filter(|step| step.added.is_some());
+    added.try_fold(model.clone(), |model, step| without_step(&model, step))
+}
+
 /// The model without some of its effects.
 fn without(model: &Model, effects: &[usize]) -> Option<Model> {
     effects
@@ -426,18 +432,7 @@ mod tests {
 
     #[test]
     fn an_effect_that_became_an_earlier_one_is_no_further_step() {
-        let step = |added: Option<&str>| ImprovementStep {
-            added: added.map(|effect| EffectAt {
-                effect: effect.to_owned(),
-                at: vec!["shaft".to_owned()],
-            }),
-            entries: None,
-            round: Some(0),
-            nrmse_fit: 0.1,
-            nrmse_test: 0.1,
-            twins: Vec::new(),
-            still_open: Vec::new(),
-        };
+        let step = ImprovementStep::at_shaft;
         let steps = |names: &[Option<&str>]| names.iter().map(|name| step(*name)).collect();
         let is_named = |names: &[Option<&str>]| {
             let steps: Vec<ImprovementStep> = steps(names);

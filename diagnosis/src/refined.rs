@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::compare::{error_over, free_run_error};
 use crate::error::{CompareError, FitError};
 use crate::measurements::Measurements;
-use crate::observer::{Correction, attach_observer, attach_same_observer};
+use crate::observer::{attach_observer, attach_same_observer};
 use crate::output_error::{Unaided, fitted_values};
 use crate::progress::{Cancelled, Stage, Work};
 use crate::solve::Effort;
@@ -208,7 +208,7 @@ impl<'a> Alike<'a> {
     /// draws along does not stand by itself.
     fn error_of(&self, model: &Model, work: &Work<'_>) -> Result<f64, CompareError> {
         let error = self.error(model, work)?;
-        if Correction::of(&self.runs).is_none() {
+        if self.runs.iter().all(|run| run.observer().is_none()) {
             return Ok(error);
         }
         let own = free_run_error(model, &Measurements::new(self.judging), work)?;

@@ -13,7 +13,7 @@ use crate::error::FitError;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
 use crate::progress::Work;
-use crate::refine::{free, instances, without_step};
+use crate::refine::{free, instances, without_steps};
 use crate::refined::{Alike, Refined};
 
 /// Two effects in place of one: those of `first` and `second`, at its channels.
@@ -143,10 +143,8 @@ pub(crate) fn second_anew(
     let (Some(remain), [.., last]) = (steps.iter().position(is_new), steps) else {
         return Ok(None);
     };
-    let (second, later) = (&steps[remain], steps[remain..].iter().rev());
-    let mut later = later.filter(|step| step.added.is_some());
-    let Some(without) = later.try_fold(model.clone(), |model, step| without_step(&model, step))
-    else {
+    let second = &steps[remain];
+    let Some(without) = without_steps(model, &steps[remain..]) else {
         return Ok(None);
     };
     let diagnosis = match diagnose_for(&without, measurements, aim, work) {
@@ -186,10 +184,7 @@ fn measure(
     others: &[ImprovementStep],
 ) -> Result<(), FitError> {
     let silent = best.work.silently();
-    let without = (others.iter())
-        .filter(|step| step.added.is_some())
-        .try_fold(best.model.clone(), |model, step| without_step(&model, step));
-    if let Some(without) = without
+    if let Some(without) = without_steps(best.model, others)
         && let alike = Alike::new(&without, best.measurements, &silent)?
         && let Ok((error, fitted)) = alike.refitted(&without, &silent)
     {

@@ -137,6 +137,11 @@ impl Random {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
+    /// Noise of standard deviation 1, equally distributed.
+    pub fn noise(&mut self) -> f64 {
+        12f64.sqrt() * (self.share() - 0.5)
+    }
+
     /// A whole number below `end`, which is above 0.
     pub fn below(&mut self, end: usize) -> usize {
         ((self.bits() >> 33) as usize) % end

@@ -7,23 +7,12 @@
 
 use std::fmt::Write;
 
-use loopsight::{Answer, ImproveOptions, Log, Model, Session};
 use loopsight_tests::Random;
 use serde_json::Value;
 
-/// What `improve` answers, as JSON.
-fn improved(model: &str, log: &str) -> Value {
-    let model = Model::from_toml("model.toml", model).unwrap();
-    let log = Log::from_bytes("log.csv", log.as_bytes()).unwrap();
-    let session = Session::new(model, log).unwrap();
-    let found = session.improve(&ImproveOptions::default()).unwrap();
-    serde_json::from_str(&found.to_json().unwrap()).unwrap()
-}
+mod sessions;
 
-/// Noise of standard deviation 1.
-fn noise(random: &mut Random) -> f64 {
-    12f64.sqrt() * (random.share() - 0.5)
-}
+use sessions::improved;
 
 /// The effects that were added, and the unseen error with each.
 fn added(found: &Value) -> Vec<(String, f64)> {
@@ -58,9 +47,9 @@ fn a_car_that_understeers_has_a_gyro_that_is_off() {
         speed += step * (faster - speed).clamp(-2.0, 2.0);
         if k % 20 == 0 {
             let read = [
-                3.6 * speed + 0.1 * noise(&mut random),
-                steer + 0.05 * noise(&mut random),
-                yaw_rate.to_degrees() + 0.8 + 0.15 * noise(&mut random),
+                3.6 * speed + 0.1 * random.noise(),
+                steer + 0.05 * random.noise(),
+                yaw_rate.to_degrees() + 0.8 + 0.15 * random.noise(),
             ];
             let [speed, steer, yaw_rate] = read;
             let time = k as f64 * step;
@@ -104,7 +93,7 @@ fn a_sensor_in_a_pocket_lags_by_a_minute_and_a_half() {
             until = k + 60 * (5 + random.below(20));
         }
         if k % 30 == 0 {
-            let read = pocket + 0.03 * noise(&mut random);
+            let read = pocket + 0.03 * random.noise();
             writeln!(log, "{k},{bath},{read:.2}").unwrap();
         }
         vessel += rate * (bath - vessel);

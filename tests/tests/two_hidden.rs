@@ -7,23 +7,12 @@
 
 use std::fmt::Write;
 
-use loopsight::{Answer, ImproveOptions, Log, Model, Session};
 use loopsight_tests::Random;
 use serde_json::Value;
 
-/// What `improve` answers, as JSON.
-fn improved(model: &str, log: &str) -> Value {
-    let model = Model::from_toml("model.toml", model).unwrap();
-    let log = Log::from_bytes("log.csv", log.as_bytes()).unwrap();
-    let session = Session::new(model, log).unwrap();
-    let found = session.improve(&ImproveOptions::default()).unwrap();
-    serde_json::from_str(&found.to_json().unwrap()).unwrap()
-}
+mod sessions;
 
-/// Noise of standard deviation 1.
-fn noise(random: &mut Random) -> f64 {
-    12f64.sqrt() * (random.share() - 0.5)
-}
+use sessions::improved;
 
 /// Checks the effects that were added, in any order, and the values of some parameters to 5 %.
 fn check(found: &Value, effects: &[&str], values: &[(&str, f64)]) {
@@ -53,7 +42,7 @@ fn a_pendulum_rubs_and_its_sensor_is_off() {
         }
         if k % 40 == 0 {
             let time = k as f64 * step;
-            let read = angle + off + 0.003 * noise(&mut random);
+            let read = angle + off + 0.003 * random.noise();
             writeln!(log, "{time:.2},{current:.4},{read:.4}").unwrap();
         }
         let torque = 0.2 * current - 2.0 * angle.sin() - 0.03 * rate;
@@ -95,14 +84,14 @@ fn a_balancing_robot_rubs_and_its_pitch_is_off() {
             until = k + 4000 + random.below(8500);
         }
         if k % 50 == 0 {
-            let seen = pitch + 0.0005 * noise(&mut random);
+            let seen = pitch + 0.0005 * random.noise();
             let law = 35.0 * seen + 5.5 * rate + 4.0 * (speed - wanted);
-            torque = law.clamp(-12.0, 12.0) + 0.4 * noise(&mut random);
+            torque = law.clamp(-12.0, 12.0) + 0.4 * random.noise();
             let read = [
                 torque / 0.8,
                 seen.to_degrees() + off,
-                rate.to_degrees() + 0.1 * noise(&mut random),
-                (speed / radius) * 60.0 / std::f64::consts::TAU + 0.2 * noise(&mut random),
+                rate.to_degrees() + 0.1 * random.noise(),
+                (speed / radius) * 60.0 / std::f64::consts::TAU + 0.2 * random.noise(),
             ];
             let [current, angle, turning, wheel] = read;
             let time = k * 200;
