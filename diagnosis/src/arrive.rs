@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use crate::error::FitError;
 use crate::prediction::{InitialStates, Solution, estimated_states};
-use crate::problem::{Problem, declared};
+use crate::problem::Problem;
 use crate::regression::batch;
 use crate::settings::FitSettings;
 use crate::solve::Effort;
@@ -121,7 +121,7 @@ impl Problem<'_> {
             starts.truncate(OTHERS);
             if best.error > criteria.lost {
                 // Not around where it went astray.
-                starts.extend(self.scattered(&declared(self.model))?);
+                starts.extend(self.scattered(&self.model.declared_values())?);
             }
             let mut furthest: Option<Attempt> = None;
             for start in &starts {
@@ -214,11 +214,11 @@ impl Problem<'_> {
         }
         if !self.model.missing_values().is_empty() || starts.is_empty() {
             let from = "the sizes of the declarations";
-            starts.extend(self.start(from, declared(self.model))?);
+            starts.extend(self.start(from, self.model.declared_values())?);
         }
         starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         if starts.is_empty() {
-            return self.scattered(&declared(self.model));
+            return self.scattered(&self.model.declared_values());
         }
         Ok(starts)
     }

@@ -5,7 +5,7 @@ use loopsight_model::model::{Model, ModelParameter};
 use loopsight_model::registry;
 use loopsight_model::run::Run;
 
-use crate::commands::{largest_at, largest_inputs};
+use crate::commands::Commands;
 use crate::criteria::SearchCriteria;
 use crate::ends::Ends;
 use crate::estimate::ParameterVerdict;
@@ -278,7 +278,7 @@ pub(crate) fn candidates(
         ..
     } = *seen;
     let sign_width = criteria.sign_width;
-    let largest = largest_inputs(model, runs);
+    let commands = Commands::of(model, runs);
     let mut found = Vec::new();
     let possible = |meta: &&EffectMeta| !(model.log.inputs_measured && meta.before_input);
     let known = registry::effects().into_iter().filter(possible);
@@ -334,7 +334,7 @@ pub(crate) fn candidates(
                 for set in *sets {
                     with = with.and_then(|m| m.with_effect(meta.id, set));
                     if let Some(model) = with.as_mut().filter(|_| !own) {
-                        flow = suit(model, rms, &largest, sign_width).max(flow);
+                        flow = suit(model, rms, &commands, sign_width).max(flow);
                     }
                 }
                 if let Some(mut model) = with {
@@ -351,7 +351,7 @@ pub(crate) fn candidates(
                         by_position: !observed && Positions::matter_to(meta),
                         widths: widths(&model, rms, sign_width),
                         reach: last_rms(&model, Role::Position, rms),
-                        command: last_command(&model, &largest),
+                        command: last_command(&model, &commands),
                         ends: last_ends(&model, ends),
                         model,
                         flow,
@@ -365,8 +365,8 @@ pub(crate) fn candidates(
 }
 
 /// The largest command in the unit of the channels of the last effect of a model.
-fn last_command(model: &Model, largest: &[f64]) -> Option<f64> {
-    largest_at(model, model.effects.last()?.at.first()?, largest)
+fn last_command(model: &Model, commands: &Commands) -> Option<f64> {
+    commands.at(model, model.effects.last()?.at.first()?)
 }
 
 #[cfg(test)]
@@ -394,7 +394,7 @@ mod tests {
                 replaces: None,
                 flow,
                 reach: 0.0,
-                command: last_command(&model, &[12.0]),
+                command: last_command(&model, &Commands::within(vec![12.0])),
                 ends: [None; 2],
                 by_position: false,
                 widths: Vec::new(),

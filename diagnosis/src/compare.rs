@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::error::CompareError;
 use crate::measurements::Measurements;
 use crate::observer::{Correction, attach_observer};
+use crate::pace::Paced;
 use crate::prediction::{InitialStates, Solution, for_each_run, one_step, predict};
 use crate::progress::{Cancelled, Stage, Work};
 use crate::score::{SignalScore, Tally, overall};
@@ -96,6 +97,16 @@ pub struct SignalTrace {
 /// [`CompareError`] when the model has no values or measures nothing, when there is no sample, when the
 /// simulation diverges, and when the work was cancelled.
 pub fn compare(
+    model: &Model,
+    measurements: &Measurements<'_>,
+    work: &Work<'_>,
+) -> Result<Comparison, CompareError> {
+    let paced = Paced::of(model, measurements.runs, work);
+    compare_paced(&paced.model, measurements, &paced.work(work))
+}
+
+/// As [`compare`], with a model and criteria that are [`Paced`].
+pub(crate) fn compare_paced(
     model: &Model,
     measurements: &Measurements<'_>,
     work: &Work<'_>,

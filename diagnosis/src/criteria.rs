@@ -57,6 +57,27 @@ impl Criteria {
     }
 }
 
+impl Criteria {
+    /// The criteria for a machine that takes `scale` s for what takes a robot a second.
+    pub(crate) fn at_time_scale(&self, scale: f64) -> Self {
+        let mut scaled = *self;
+        let times = [
+            &mut scaled.log.motion_s,
+            &mut scaled.log.run_s,
+            &mut scaled.start.late_s,
+            &mut scaled.start.rest_s,
+            &mut scaled.holdout.shortest_s,
+            &mut scaled.holdout.longest_s,
+            &mut scaled.search.rests_s,
+            &mut scaled.fails.after_change_s,
+        ];
+        for time in times {
+            *time *= scale;
+        }
+        scaled
+    }
+}
+
 impl ChoiceCriteria {
     /// Ratio of errors up to which an effect with `few` parameters takes the place of one with `many` that contains it.
     pub(crate) fn allowance(&self, many: usize, few: usize) -> f64 {

@@ -23,6 +23,7 @@ use crate::judge::{Losses, nrmse};
 use crate::measurements::Measurements;
 use crate::observer::{Correction, attach_same_observer};
 use crate::output_error::{Unaided, prepare};
+use crate::pace::Paced;
 use crate::pairs::pair;
 use crate::prediction::{Solution, moves_starts, signal_rms};
 use crate::problem::Problem;
@@ -57,6 +58,8 @@ pub fn diagnose(
     measurements: &Measurements<'_>,
     work: &Work<'_>,
 ) -> Result<Diagnosis, FitError> {
+    let paced = Paced::of(model, measurements.runs, work);
+    let (model, work) = (&paced.model, &paced.work(work));
     let aim = Aim {
         worth: 0.0,
         discover: Discover::Never,

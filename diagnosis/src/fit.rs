@@ -3,11 +3,12 @@
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 
-use crate::compare::{compare, free_run_error};
+use crate::compare::{compare_paced, free_run_error};
 use crate::error::{CompareError, FitError};
 use crate::fitted::Fit;
 use crate::measurements::Measurements;
 use crate::output_error::Unaided;
+use crate::pace::Paced;
 use crate::progress::{Cancelled, Work};
 use crate::settings::{FitSettings, Method};
 use crate::{output_error, rls};
@@ -26,7 +27,9 @@ pub fn fit(
     settings: &FitSettings,
     work: &Work<'_>,
 ) -> Result<Fit, FitError> {
-    fit_for(model, measurements, settings, Unaided::Sought, work)
+    let paced = Paced::of(model, measurements.runs, work);
+    let work = paced.work(work);
+    fit_for(&paced.model, measurements, settings, Unaided::Sought, &work)
 }
 
 /// As [`fit`], where it may be known whether the model needs an observer.
@@ -79,7 +82,7 @@ fn compared(
             runs,
             ..*measurements
         };
-        compare(&result.model, &on, &work.silently())
+        compare_paced(&result.model, &on, &work.silently())
     };
     let on_fit = on(measurements.runs)?;
     let nrmse_fit = on_fit.nrmse;

@@ -11,6 +11,7 @@ use crate::fitted::Fit;
 use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
 use crate::output_error::Unaided;
+use crate::pace::Paced;
 use crate::pairs::pair;
 use crate::progress::{Cancelled, Work};
 use crate::refine::{
@@ -38,6 +39,8 @@ pub fn improve(
     settings: &ImproveSettings,
     work: &Work<'_>,
 ) -> Result<Improvement, FitError> {
+    let paced = Paced::of(model, measurements.runs, work);
+    let (model, work) = (&paced.model, &paced.work(work));
     if !settings.discover {
         return improve_with(model, measurements, Discover::Never, work);
     }

@@ -115,6 +115,7 @@ mod noise;
 mod observer;
 mod omitted;
 mod output_error;
+mod pace;
 mod pairs;
 mod passage;
 mod places;

@@ -14,7 +14,7 @@ use crate::narrow::narrowed;
 use crate::noise;
 use crate::observer::{Correction, attach_observer_for, growth};
 use crate::prediction::InitialStates;
-use crate::problem::{Problem, declared};
+use crate::problem::Problem;
 use crate::progress::{Cancelled, Work};
 use crate::regression::batch;
 use crate::settings::{FitSettings, Method};
@@ -230,7 +230,7 @@ fn first_values(
     match batch(model, runs, settings.scheme, 0.0, work) {
         Ok(values) => Ok(Some(values)),
         Err(FitError::Cancelled(cancelled)) => Err(cancelled),
-        Err(FitError::NoRegression(_)) => Ok(Some(declared(model))),
+        Err(FitError::NoRegression(_)) => Ok(Some(model.declared_values())),
         Err(_) => Ok(None),
     }
 }

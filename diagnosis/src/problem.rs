@@ -99,7 +99,7 @@ impl<'a> Problem<'a> {
             .collect();
         let visible = match known_states {
             Some(_) => Vec::new(),
-            None => estimated_states(model, &declared(model), runs),
+            None => estimated_states(model, &model.declared_values(), runs),
         };
         let first = match known_states {
             Some(_) => Vec::new(),
@@ -465,14 +465,5 @@ fn nominal(model: &Model) -> Vec<f64> {
         .parameters
         .iter()
         .map(|p| p.value.unwrap_or(0.0))
-        .collect()
-}
-
-/// The file's values, else the noticeable sizes of the declarations.
-pub(crate) fn declared(model: &Model) -> Vec<f64> {
-    model
-        .parameters
-        .iter()
-        .map(|p| p.value.unwrap_or_else(|| p.declaration.nearest(p.scale())))
         .collect()
 }

@@ -9,7 +9,7 @@ use loopsight_model::run::{Run, shortest_period};
 use crate::arrive::Starts;
 use crate::candidates::Candidate;
 use crate::judge::nrmse;
-use crate::problem::{Problem, declared};
+use crate::problem::Problem;
 use crate::settings::FitSettings;
 use crate::trial::{FINAL, Judged, Nominal};
 use crate::unfold::unfolded;
@@ -90,7 +90,7 @@ pub(crate) fn fresh_starts(
     if !folded && !given.missing_values().is_empty() {
         return Vec::new();
     }
-    let mut bases = vec![declared(given)];
+    let mut bases = vec![given.declared_values()];
     let inputs = if folded { given.plant.inputs.len() } else { 0 };
     for input in 0..inputs {
         let mut runs = nominal.holdout.runs.to_vec();

@@ -3,16 +3,42 @@
 use loopsight_core::{Parameter, Place, Role};
 use loopsight_model::model::{Attached, Model, Origin};
 
+use crate::commands::Commands;
 use crate::ends::{Ends, limited};
 
 /// Sets the smoothing width of the last effect of `model` to `sign_width` times the flow in the recording, and
 /// the commands that its sizes refer to: of root mean squares `rms` of the signals, and `largest` inputs. Returns the root
 /// mean square of the flow at its channels.
-pub(crate) fn suit(model: &mut Model, rms: &[f64], largest: &[f64], sign_width: f64) -> f64 {
+pub(crate) fn suit(model: &mut Model, rms: &[f64], commands: &Commands, sign_width: f64) -> f64 {
     let flow = last_rms(model, Role::Flow, rms);
     smooth(model, 1, sign_width * flow);
-    refer(model, rms, largest);
+    refer(model, rms, &commands.largest);
+    weaken(model, commands);
     flow
+}
+
+/// Takes the efforts of the last effect of `model` as small as its commands, where these are smaller than what the plant declares
+/// for its channel: a mirror that a coil turns has no friction of 0.3 N m.
+fn weaken(model: &mut Model, commands: &Commands) {
+    let effect = model.effects.last();
+    let Some((first, channel)) = effect.and_then(|e| Some((e.first_parameter, *e.at.first()?)))
+    else {
+        return;
+    };
+    let Some(weaker) = commands
+        .at(model, channel)
+        .map(|command| command / channel.size)
+    else {
+        return;
+    };
+    if !matches!(channel.place, Place::Effort(_)) || weaker >= 1.0 || weaker <= 0.0 {
+        return;
+    }
+    for parameter in &mut model.parameters[first..] {
+        if parameter.declaration.unit.starts_with("channel") {
+            parameter.size *= weaker;
+        }
+    }
 }
 
 /// Sets what the last effect of `model` refers its commands to, to two digits: the root mean square of the recording's,

@@ -9,6 +9,7 @@ mod per_run;
 mod proposed;
 mod signals;
 mod ties;
+mod time_scale;
 
 use std::path::Path;
 
@@ -58,6 +59,8 @@ pub struct Model {
     pub by_motion: bool,
     /// Shortest time constant that a simulation follows, s, see [`Model::follow`].
     pub shortest_lag: f64,
+    /// How long the machine takes for what takes a robot a second, s, see [`Model::at_time_scale`].
+    time_scale: f64,
     pub(crate) dynamics: &'static dyn AnyDynamics,
     pub(crate) set: usize,
     pub(crate) n_plant_parameters: usize,
@@ -181,6 +184,7 @@ impl Model {
             step_given: file.simulation.max_step_s.is_some(),
             by_motion: false,
             shortest_lag: SHORTEST_LAG_S,
+            time_scale: 1.0,
             dynamics: ready.dynamics,
             set: values.set,
             n_plant_parameters,
@@ -312,6 +316,14 @@ impl Model {
         self.parameters
             .iter()
             .map(|p| p.value.unwrap_or(f64::NAN))
+            .collect()
+    }
+
+    /// Values of all parameters, in order; where none is known yet, a size that is admissible.
+    pub fn declared_values(&self) -> Vec<f64> {
+        self.parameters
+            .iter()
+            .map(|p| p.value.unwrap_or_else(|| p.declaration.nearest(p.scale())))
             .collect()
     }
 

@@ -9,6 +9,10 @@ criteria! {
     log: LogCriteria {
         /// Shortest time with something moving.
         motion_s: f64 = 2.0 "s", Judgement: "ten time constants of 0.2 s";
+        /// Rate of samples above which times of motion are as many samples as at this rate.
+        fast_hz: f64 = 1e3 "Hz", Judgement: "controllers of robots run at up to 1 kHz, and what is sampled faster is seldom one";
+        /// How long the slowest measured signal of a robot takes to change by as much as it varies. Where one takes as long, the machine is no faster than a robot, however fast it is sampled.
+        changes_s: f64 = 0.1 "s", Judgement: "with a time constant of 0.2 s a speed is another one after half of it";
         /// Shortest run of which at least one is needed.
         run_s: f64 = 1.0 "s", Judgement: "a shorter free run is mostly its initial state";
         /// A sensor whose value changes only after this many sampling periods repeats itself in between.

@@ -6,6 +6,7 @@ use loopsight_model::model::{Model, misfit};
 use loopsight_model::registry::{self, BuildError};
 
 use crate::EffectAt;
+use crate::commands::Commands;
 use crate::criteria::Criteria;
 use crate::experiment::ExperimentLimits;
 use crate::places::channel_sets;
@@ -382,7 +383,7 @@ impl Side {
         let flow = suit(
             &mut with,
             rms,
-            &vec![limit; model.plant.inputs.len()],
+            &Commands::within(vec![limit; model.plant.inputs.len()]),
             sign_width,
         );
         let reach = last_rms(&with, Role::Position, rms).max(last_rms(&with, Role::Head, rms));

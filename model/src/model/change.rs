@@ -43,6 +43,7 @@ impl Model {
         for parameter in &mut model.parameters[attached.first_parameter..] {
             parameter.free &= !parameter.declaration.further;
         }
+        model.scale_times_from(attached.first_parameter);
         model.effects.push(attached);
         make_names_unique(&mut model.parameters, &model.effects);
         model.hold_unshown();

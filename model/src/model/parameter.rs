@@ -57,6 +57,17 @@ impl ModelParameter {
         self.declaration.scale * self.size
     }
 
+    /// Takes sizes of times as those of a machine that takes `scale` s for what took it a second before; whether that changes any.
+    pub(super) fn scale_time(&mut self, scale: f64) -> bool {
+        let factor = match self.declaration.unit {
+            "s" => scale,
+            "1/s" | "rad/s" => scale.recip(),
+            _ => return false,
+        };
+        self.size *= factor;
+        factor != 1.0
+    }
+
     /// Whether it belongs to a fuller form of its effect than this model has: it keeps its default.
     pub fn is_left_out(&self) -> bool {
         self.declaration.further && !self.free

@@ -72,8 +72,9 @@ fn from_the_log(model: &Model) -> Vec<String> {
         .filter(|p| p.origin == Origin::Log)
         .filter_map(|p| {
             let value = number(p.value?);
+            let what = if p.is_time() { "rate" } else { "speed" };
             Some(format!(
-                "{} = {value} {}, which the model file leaves open, suits the speed in the log.",
+                "{} = {value} {}, which the model file leaves open, suits the {what} in the log.",
                 p.name, p.unit
             ))
         })
