@@ -123,11 +123,11 @@ impl<'a> Promises<'a> {
         let criteria = nominal.criteria();
         let cost = match shape {
             // At the measured positions the plain model, too, leaves less than in its free run. Where it leaves
-            // hardly anything, the regression tells nothing.
+            // hardly anything, or hardly more than the noise of two readings, the regression tells nothing.
             Some(_) => {
-                let promising =
-                    after < criteria.promising * before || before < criteria.told * plain;
-                if promising {
+                let noise = criteria.differences * nominal.floor.powi(2);
+                let told = (criteria.told * plain).max(noise);
+                if after < criteria.promising * before || before < told {
                     plain * after / before
                 } else {
                     f64::INFINITY

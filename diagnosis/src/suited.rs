@@ -13,30 +13,31 @@ pub(crate) fn suit(model: &mut Model, rms: &[f64], commands: &Commands, sign_wid
     let flow = last_rms(model, Role::Flow, rms);
     smooth(model, 1, sign_width * flow);
     refer(model, rms, &commands.largest);
-    weaken(model, commands);
+    scale_efforts(model, commands);
     flow
 }
 
-/// Takes the efforts of the last effect of `model` as small as its commands, where these are smaller than what the plant declares
-/// for its channel: a mirror that a coil turns has no friction of 0.3 N m.
-fn weaken(model: &mut Model, commands: &Commands) {
+/// Share of the largest command that is the least size of an effort: of 100 V that is the volt which plants declare.
+const LEAST: f64 = 0.01;
+
+/// Takes the size of the efforts of the last effect of `model` from its commands, where what the plant declares for its channel is
+/// more than the largest of these, or hardly a part of it. A mirror that a coil turns has no friction of 0.3 N m, and a press
+/// that pushes with 100 kN has more than 0.3 N.
+fn scale_efforts(model: &mut Model, commands: &Commands) {
     let effect = model.effects.last();
     let Some((first, channel)) = effect.and_then(|e| Some((e.first_parameter, *e.at.first()?)))
     else {
         return;
     };
-    let Some(weaker) = commands
-        .at(model, channel)
-        .map(|command| command / channel.size)
-    else {
+    let is_effort = matches!(channel.place, Place::Effort(_));
+    let command = commands.at(model, channel);
+    let Some(command) = command.filter(|c| is_effort && c.is_normal()) else {
         return;
     };
-    if !matches!(channel.place, Place::Effort(_)) || weaker >= 1.0 || weaker <= 0.0 {
-        return;
-    }
+    let size = channel.size.clamp(LEAST * command, command);
     for parameter in &mut model.parameters[first..] {
         if parameter.declaration.unit.starts_with("channel") {
-            parameter.size *= weaker;
+            parameter.size *= size / channel.size;
         }
     }
 }

@@ -147,6 +147,8 @@ criteria! {
         promising: f64 = 0.99 "1", Judgement: "one per cent";
         /// Share of the plain cost below which the measured positions alone explain everything.
         told: f64 = 0.1 "1", Judgement: "positions are measured, so they are then no test";
+        /// Variances of the noise below which measured positions tell nothing: each sample begins at a reading and ends at one.
+        differences: f64 = 2.2 "1", Derived: "the difference of two readings has twice the variance of one; a tenth more may be the plain model's";
         /// Smoothing width of a sign at first, as a share of the flow.
         sign_width: f64 = 0.02 "flow", Judgement: "wide enough for a fit to converge";
         /// Smoothing width of the sharpest sign in a full fit, as a share of the flow.

@@ -61,6 +61,8 @@ impl Effect for Hysteresis {
         reads: &[Role::Flow, Role::Position],
         // What rolls on its way has nothing to come back to: its friction is dry.
         yields_to: &[Role::Heading],
+        // With neither loss nor gain it is one.
+        simpler: &["linear_stiffness"],
         parameters: &[
             Parameter::new(
                 "stiffness",
