@@ -235,7 +235,8 @@ pub fn parse(text: &str) -> Result<Unit, UnitError> {
 /// ```
 ///
 /// The rule cannot know what was meant: `x_h` is x in hours and `K_A` is K in amperes. `in` is an
-/// inch at the very end or before `per` only (`force_in_N` is `force_in` in newtons). Whoever
+/// inch at the very end or before `per` only (`force_in_N` is `force_in` in newtons), and `l` and `L` are litres before `per` or
+/// `min` only (`wheel_l` is the left one). Whoever
 /// looks for a known name should try the whole column first, and then the name, an underscore
 /// and a unit.
 pub fn split_name(column: &str) -> (&str, Option<&str>) {
@@ -251,7 +252,13 @@ pub fn split_name(column: &str) -> (&str, Option<&str>) {
 fn is_ending(text: &str) -> bool {
     let mut tokens = text.split('_').peekable();
     while let Some(token) = tokens.next() {
-        if token == "in" && tokens.peek().is_some_and(|next| *next != "per") {
+        let next = tokens.peek();
+        let is_word = match token {
+            "in" => next.is_some_and(|next| *next != "per"),
+            "l" | "L" => next.is_none_or(|next| !["per", "min"].contains(next)),
+            _ => false,
+        };
+        if is_word {
             return false;
         }
     }
@@ -295,6 +302,12 @@ mod tests {
         is("mrad", 1e-3, "rad");
         is("deg", PI / 180.0, "rad");
         is("rpm", PI / 30.0, "s^-1 rad");
+        is("mbar", 100.0, "m^-1 kg s^-2");
+        is("psi", 6894.757_293_168_361, "m^-1 kg s^-2");
+        is("L/min", 1e-3 / 60.0, "m^3 s^-1");
+        is("lpm", 1e-3 / 60.0, "m^3 s^-1");
+        is("kWh", 3.6e6, "m^2 kg s^-2");
+        is("mAh", 3.6, "s A");
         is("dps", PI / 180.0, "s^-1 rad");
         is("rps", 2.0 * PI, "s^-1 rad");
         is("kph", 1.0 / 3.6, "m s^-1");
@@ -391,6 +404,10 @@ mod tests {
             ("K_A", "K", Some("A")),
             ("force_in_N", "force_in", Some("N")),
             ("length_in", "length", Some("in")),
+            ("oil_mbar", "oil", Some("mbar")),
+            ("flow_L_min", "flow", Some("L_min")),
+            ("wheel_l", "wheel_l", None),
+            ("way_l_m", "way_l", Some("m")),
             ("speed", "speed", None),
             ("wheel_1", "wheel_1", None),
             ("u1", "u1", None),

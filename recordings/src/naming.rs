@@ -114,8 +114,8 @@ pub(crate) fn split(text: &str) -> (&str, Option<String>) {
     (text, None)
 }
 
-/// The unit that the end of a name means: `m_per_s` where it is `m_s`, and `rad_per_s2` where it is `rad_s2`. A way or an angle
-/// times a time is measured by nobody.
+/// The unit that the end of a name means: `m_per_s` where it is `m_s`, and `rad_per_s2` where it is `rad_s2`. A way, an angle
+/// or a volume times a time is measured by nobody.
 pub(crate) fn ending(unit: &str) -> String {
     let whose = |text: &str, base: &str| {
         parse(base).is_ok_and(|base| parse(text).is_ok_and(|unit| unit.dimension == base.dimension))
@@ -123,7 +123,7 @@ pub(crate) fn ending(unit: &str) -> String {
     match unit.rsplit_once('_') {
         Some((way, time))
             if !way.contains('_')
-                && (whose(way, "m") || whose(way, "rad"))
+                && ["m", "rad", "m^3"].iter().any(|base| whose(way, base))
                 && (whose(time, "s") || whose(time, "s2")) =>
         {
             format!("{way}_per_{time}")
@@ -201,6 +201,7 @@ mod tests {
     fn units_behind_a_line_or_in_brackets() {
         for (text, name, unit) in [
             ("speed_rpm", "speed", Some("rpm")),
+            ("pump_l_min", "pump", Some("l_per_min")),
             ("speed [rpm]", "speed", Some("rpm")),
             ("Left Speed (M/s)", "Left Speed", Some("m/s")),
             ("u(V)", "u", Some("V")),

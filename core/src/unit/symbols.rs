@@ -11,8 +11,11 @@ const fn unit(factor: f64, exponents: [i8; 6]) -> Unit {
     }
 }
 
+/// A pound, falling freely, on a square inch: 0.453 592 37 kg at 9.806 65 m/s² on 0.0254² m².
+const PSI: f64 = 0.453_592_37 * 9.806_65 / (0.0254 * 0.0254);
+
 /// Symbols that take prefixes; exponents of m, kg, s, A, K, rad.
-const PREFIXABLE: [(&str, Unit); 17] = [
+const PREFIXABLE: [(&str, Unit); 20] = [
     ("m", unit(1.0, [1, 0, 0, 0, 0, 0])),
     ("g", unit(1e-3, [0, 1, 0, 0, 0, 0])),
     ("s", unit(1.0, [0, 0, 1, 0, 0, 0])),
@@ -28,6 +31,9 @@ const PREFIXABLE: [(&str, Unit); 17] = [
     ("F", unit(1.0, [-2, -1, 4, 2, 0, 0])),
     ("C", unit(1.0, [0, 0, 1, 1, 0, 0])),
     ("Pa", unit(1.0, [-1, 1, -2, 0, 0, 0])),
+    ("bar", unit(1e5, [-1, 1, -2, 0, 0, 0])),
+    ("Wh", unit(3600.0, [2, 1, -2, 0, 0, 0])),
+    ("Ah", unit(3600.0, [0, 0, 1, 1, 0, 0])),
     ("K", unit(1.0, [0, 0, 0, 0, 1, 0])),
     ("rad", unit(1.0, [0, 0, 0, 0, 0, 1])),
 ];
@@ -87,6 +93,10 @@ fn symbol(word: &str) -> Option<Unit> {
             "mph" => unit(0.44704, [1, 0, -1, 0, 0, 0]),
             "count" | "counts" => Unit::ONE,
             "percent" | "%" => unit(0.01, [0; 6]),
+            "L" | "l" => unit(1e-3, [3, 0, 0, 0, 0, 0]),
+            "mL" | "ml" => unit(1e-6, [3, 0, 0, 0, 0, 0]),
+            "lpm" | "LPM" => unit(1e-3 / 60.0, [3, 0, -1, 0, 0, 0]),
+            "psi" => unit(PSI, [-1, 1, -2, 0, 0, 0]),
             "in" => unit(0.0254, [1, 0, 0, 0, 0, 0]),
             "ft" => unit(0.3048, [1, 0, 0, 0, 0, 0]),
             _ => return None,
