@@ -20,7 +20,12 @@ impl Commands {
     /// Those in `runs` of a `model`.
     pub(crate) fn of(model: &Model, runs: &[Run]) -> Self {
         let largest = largest_inputs(model, runs);
-        let efforts = efforts(model, &largest, shortest_period(runs));
+        let period = shortest_period(runs);
+        let efforts = if period.is_normal() {
+            efforts(model, &largest, period)
+        } else {
+            Vec::new()
+        };
         Self { largest, efforts }
     }
 
@@ -102,7 +107,7 @@ pub(crate) fn largest_inputs(model: &Model, runs: &[Run]) -> Vec<f64> {
     let of = |i: usize| {
         let samples = runs
             .iter()
-            .flat_map(|run| (0..run.len()).map(move |k| run.input(k)[i]));
+            .flat_map(|run| (0..run.len()).filter_map(move |k| run.input(k).get(i).copied()));
         samples.fold(0.0, |largest: f64, u| largest.max(u.abs()))
     };
     (0..model.plant.inputs.len()).map(of).collect()

@@ -1,12 +1,14 @@
-//! How fast a machine goes: what is sampled faster than a robot is done sooner.
+//! How fast and how strong a machine is: what is sampled faster than a robot is done sooner.
 
 use loopsight_model::model::Model;
 use loopsight_model::run::{Run, shortest_period};
 
+use crate::commands::Commands;
 use crate::criteria::Criteria;
 use crate::progress::Work;
+use crate::suited::scale_efforts;
 
-/// A model, and criteria to decide by, in the time of the machine that was recorded.
+/// A model, and criteria to decide by, in the time of the machine that was recorded, and with effects of the size of its commands.
 ///
 /// Times of motion among the criteria (how long a run must be, how long a machine rests) and times of effects (where the fit of a delay
 /// begins) are those of robots. A converter of voltages does in milliseconds what a robot does in seconds. For it they are as many samples as they are at
@@ -21,8 +23,13 @@ impl Paced {
     pub(crate) fn of(model: &Model, runs: &[Run], work: &Work<'_>) -> Self {
         let given = work.criteria();
         let pace = pace(runs, given);
+        let mut model = model.at_time_scale(pace);
+        if !model.effects.is_empty() {
+            let commands = Commands::of(&model, runs);
+            scale_efforts(&mut model, &commands);
+        }
         Self {
-            model: model.at_time_scale(pace),
+            model,
             criteria: given.at_time_scale(pace),
         }
     }
@@ -82,7 +89,39 @@ fn slowest(run: &Run) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use loopsight_plants as _;
+
     use super::*;
+
+    /// A mirror that a coil turns with 4 mN m/A, sampled at 100 kHz.
+    #[test]
+    fn effects_of_a_model_are_as_small_and_as_fast_as_its_machine() {
+        let text = "[plant.expression.states]\nspeed = { unit = \"rad/s\", rate = \"(0.004 * current - 1e-5 * speed + axle) / 2e-8\" }\n\
+                    [plant.expression.inputs]\ncurrent = { unit = \"A\" }\n\
+                    [plant.expression.channels]\naxle = { unit = \"N m\", flow = \"speed\" }\n\
+                    [log.measured.speed]\n[[effect]]\n[effect.coulomb_friction]\nat = [\"axle\"]\n\
+                    [[effect]]\n[effect.input_delay]\nat = [\"input\"]\n";
+        let (given, _) = Model::from_toml("mirror.toml", text).unwrap();
+        let mut run = Run::empty(1, 1);
+        for k in 0..2000 {
+            let current = if k % 40 < 20 { 2.0 } else { -2.0 };
+            run.push(1e-5 * f64::from(k), &[current], &[current])
+                .unwrap();
+        }
+        let runs = [run];
+        let mut model = given.clone();
+        for _ in 0..2 {
+            model = Paced::of(&model, &runs, &Work::quiet()).model;
+            let grown = |name: &str| {
+                let at = model.parameters.iter().position(|p| p.name == name);
+                let at = at.unwrap();
+                model.parameters[at].scale() / given.parameters[at].scale()
+            };
+            assert!((grown("coulomb_friction.level") - 0.008).abs() < 1e-9);
+            assert!((grown("input_delay.delay") - 0.01).abs() < 1e-9);
+            assert!((model.max_step / given.max_step - 0.01).abs() < 1e-9);
+        }
+    }
 
     /// The pace of a machine that is sampled at `rate` and follows a command with the time constant `lag`; the command changes
     /// every five of these.

@@ -1,7 +1,7 @@
 //! An effect of a model, suited to a recording: widths of signs, references, how fast and how far its channels move.
 
 use loopsight_core::{Parameter, Place, Role};
-use loopsight_model::model::{Attached, Model, Origin};
+use loopsight_model::model::{Attached, Model, Origin, unit_at};
 
 use crate::commands::Commands;
 use crate::ends::{Ends, limited};
@@ -20,24 +20,27 @@ pub(crate) fn suit(model: &mut Model, rms: &[f64], commands: &Commands, sign_wid
 /// Share of the largest command that is the least size of an effort: of 100 V that is the volt which plants declare.
 const LEAST: f64 = 0.01;
 
-/// Takes the size of the efforts of the last effect of `model` from its commands, where what the plant declares for its channel is
+/// Takes the size of the efforts of the effects of `model` from its commands, where what the plant declares for their channel is
 /// more than the largest of these, or hardly a part of it. A mirror that a coil turns has no friction of 0.3 N m, and a press
 /// that pushes with 100 kN has more than 0.3 N.
-fn scale_efforts(model: &mut Model, commands: &Commands) {
-    let effect = model.effects.last();
-    let Some((first, channel)) = effect.and_then(|e| Some((e.first_parameter, *e.at.first()?)))
-    else {
-        return;
-    };
-    let is_effort = matches!(channel.place, Place::Effort(_));
-    let command = commands.at(model, channel);
-    let Some(command) = command.filter(|c| is_effort && c.is_normal()) else {
-        return;
-    };
-    let size = channel.size.clamp(LEAST * command, command);
-    for parameter in &mut model.parameters[first..] {
-        if parameter.declaration.unit.starts_with("channel") {
-            parameter.size *= size / channel.size;
+pub(crate) fn scale_efforts(model: &mut Model, commands: &Commands) {
+    for k in 0..model.effects.len() {
+        let effect = &model.effects[k];
+        let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+        let channel = effect.at.first().copied();
+        let effort = channel.filter(|c| matches!(c.place, Place::Effort(_)));
+        let Some(channel) = effort else { continue };
+        let command = commands.at(model, channel);
+        let Some(command) = command.filter(|c| c.is_normal()) else {
+            continue;
+        };
+        let size = channel.size.clamp(LEAST * command, command);
+        let plant = model.plant;
+        for parameter in &mut model.parameters[own] {
+            let unit = parameter.declaration.unit;
+            if unit.starts_with("channel") {
+                parameter.size = unit_at(unit, channel, plant).1 * size / channel.size;
+            }
         }
     }
 }

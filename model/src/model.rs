@@ -390,7 +390,7 @@ impl Model {
 
     /// Longest integration step of the plant where no file gives one, s.
     pub fn usual_step(&self) -> f64 {
-        f64::dynamics(self.dynamics).max_step_s()
+        self.time_scale * f64::dynamics(self.dynamics).max_step_s()
     }
 
     /// Longest usual integration step, s: [`Model::max_step`], or what an effect asks for with

@@ -7,7 +7,8 @@ impl Model {
     ///
     /// The declarations of effects have the times of robots: a delay begins with 10 ms, a shaft swings with 10 rad/s to 270 rad/s. Here
     /// such sizes and starting values are `scale` times as long, for the effects that the model has and for those that are added to it. Of the latter, times that no fit finds are so, too,
-    /// where a file does not give them. Parameters of the plant are as they are.
+    /// where a file does not give them. Parameters of the plant are as they are. The usual integration step is `scale` times as long, where the
+    /// file does not give it.
     pub fn at_time_scale(&self, scale: f64) -> Model {
         let mut model = self.clone();
         let longer = scale / self.time_scale;
@@ -15,6 +16,10 @@ impl Model {
             parameter.scale_time(longer);
         }
         model.time_scale = scale;
+        // Where dry friction sticks, a step is a share of the usual one.
+        if !model.step_given {
+            model.max_step *= longer;
+        }
         model
     }
 
