@@ -15,7 +15,8 @@ use crate::pace::Paced;
 use crate::pairs::pair;
 use crate::progress::{Cancelled, Work};
 use crate::refine::{
-    blurs, estimated, is_mostly_open, is_undetermined, refine, still_open, without_step,
+    blurs, estimated, has_the_effects_of, is_mostly_open, is_undetermined, refine, still_open,
+    without_step,
 };
 use crate::settings::{FitSettings, ImproveSettings, Method};
 use crate::split::second_anew;
@@ -125,6 +126,8 @@ struct State {
     before: Option<(Model, Vec<ImprovementStep>)>,
     steps: Vec<ImprovementStep>,
     diagnoses: Vec<Diagnosis>,
+    /// Whether the last step changed earlier ones, so that its errors are not those of the present model.
+    corrected: bool,
     /// What was tried in place of the present model, fitted, with its error.
     tried: Vec<(f64, Model)>,
     /// The present model fitted to all of the log, where that was done beside its diagnosis.
@@ -139,6 +142,7 @@ impl State {
             before: None,
             steps: Vec::new(),
             diagnoses: Vec::new(),
+            corrected: false,
             tried: Vec::new(),
             fitted: None,
         }
@@ -197,10 +201,12 @@ impl State {
         Ok(diagnosis)
     }
 
-    /// Gives a step that came of the correction of another one the errors that the next diagnosis begins with.
+    /// Gives a last step that came of the correction of another one, or corrected another one, the errors that the next diagnosis
+    /// begins with.
     fn measured(&mut self, diagnosis: &Diagnosis) {
+        let corrected = std::mem::take(&mut self.corrected);
         let last = self.steps.last_mut();
-        if let Some(last) = last.filter(|step| step.round.is_none()) {
+        if let Some(last) = last.filter(|step| step.round.is_none() || corrected) {
             last.nrmse_fit = diagnosis.nominal_fit;
             last.nrmse_test = diagnosis.nominal.nrmse;
         }
@@ -244,6 +250,7 @@ impl State {
         work: &Work<'_>,
     ) -> Result<bool, FitError> {
         self.step(best, round, work);
+        let added = self.present.clone();
         let tried = refine(
             &mut self.present,
             &mut self.steps,
@@ -252,6 +259,7 @@ impl State {
             &work.in_round(round),
         )?;
         let stays = tried.is_some();
+        self.corrected = stays && !has_the_effects_of(&self.present, &added);
         self.tried = tried.unwrap_or_default();
         Ok(stays || !self.take_back())
     }

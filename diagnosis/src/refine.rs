@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use loopsight_model::model::{Attached, Model, ModelParameter};
 use rayon::prelude::*;
 
-use crate::conclusion::Diagnosis;
+use crate::conclusion::{Diagnosis, Explanation};
 use crate::effect_at::EffectAt;
 use crate::error::FitError;
 use crate::estimate::{Estimate, ParameterVerdict, strength_is_determined};
@@ -229,37 +229,59 @@ fn simpler(model: &Model, place: &EffectAt) -> Vec<(&'static str, Model)> {
     models.collect()
 }
 
-/// Replaces an added effect by one that the data could not tell from it at first, where the error falls: once
-/// friction is in the model, a late command can be told from a late sensor.
+/// Replaces added effects by ones that the data could not tell from them at first, where the error falls: once
+/// friction is in the model, a late command can be told from a late sensor. Where that changes an earlier one, the last one was chosen
+/// beside another effect, and is compared with its twins as well.
 fn reconsidered(
     best: &mut Refined<'_>,
     steps: &mut [ImprovementStep],
     diagnoses: &[Diagnosis],
 ) -> Result<(), FitError> {
+    let (mut earlier, mut last): (Vec<_>, Vec<_>) =
+        (steps.iter_mut()).partition(|step| is_earlier(step, diagnoses));
+    let mut changed = false;
+    for step in &mut earlier {
+        changed |= is_exchanged(best, step, diagnoses)?;
+    }
+    if changed {
+        for step in &mut last {
+            is_exchanged(best, step, diagnoses)?;
+        }
+    }
+    Ok(())
+}
+
+/// Replaces the effect of a step by the best of its twins, where the error falls; whether it does.
+fn is_exchanged(
+    best: &mut Refined<'_>,
+    step: &mut ImprovementStep,
+    diagnoses: &[Diagnosis],
+) -> Result<bool, FitError> {
+    let Some(place) = step.added.as_ref() else {
+        return Ok(false);
+    };
     let criteria = best.work.criteria();
     let better = criteria.improve.better;
     let floor = diagnoses.last().map_or(0.0, |d| d.floor.nrmse);
-    for step in steps.iter_mut().filter(|step| is_earlier(step, diagnoses)) {
-        let Some(place) = step.added.as_ref() else {
-            continue;
-        };
-        let twins = twins_in(best.model, step).into_iter();
-        let (narrower, others): (Vec<_>, Vec<_>) =
-            twins.partition(|(twin, _)| is_narrower(twin, place));
-        let mut taken = None;
-        for (others, most) in [
-            (others, f64::INFINITY),
-            // At one side it also stands for whatever else makes the sides differ, while that is missing.
-            (narrower, criteria.missing.above_floor * floor),
-        ] {
-            taken = best.takes_below(others, |_| better, most)?.cloned();
-            if taken.is_some() {
-                break;
-            }
-        }
-        step.added = taken.or_else(|| step.added.take());
+    let twins = twins_in(best.model, step).into_iter();
+    let (narrower, others): (Vec<_>, Vec<_>) =
+        twins.partition(|(twin, _)| is_narrower(twin, place));
+    let mut taken = best
+        .takes_below(others, |_| better, f64::INFINITY)?
+        .cloned();
+    if taken.is_none() {
+        // At one side it also stands for whatever else makes the sides differ, while that is missing.
+        let most = criteria.missing.above_floor * floor;
+        taken = best.takes_below(narrower, |_| better, most)?.cloned();
     }
-    Ok(())
+    let Some(taken) = taken else {
+        return Ok(false);
+    };
+    if let Some(other) = named(step, diagnoses, &taken) {
+        (step.nrmse_fit, step.nrmse_test) = (other.nrmse_fit, other.nrmse);
+    }
+    step.added = Some(taken);
+    Ok(true)
 }
 
 /// The models with what the data could not tell from the effect of a `step` in its place.
@@ -345,13 +367,21 @@ fn diagnosed<'d>(
     diagnoses: &'d [Diagnosis],
     twin: &EffectAt,
 ) -> Option<&'d Model> {
+    named(step, diagnoses, twin).map(|twin| &twin.model)
+}
+
+/// What the diagnosis that named a `step` says of a twin of it.
+fn named<'d>(
+    step: &ImprovementStep,
+    diagnoses: &'d [Diagnosis],
+    twin: &EffectAt,
+) -> Option<&'d Explanation> {
     let candidates = &diagnoses.get(step.round?)?.candidates;
-    let twin = candidates.iter().find(|c| c.place == *twin)?;
-    Some(&twin.model)
+    candidates.iter().find(|c| c.place == *twin)
 }
 
 /// Whether two models have the same effects, with as many parameters that are fitted.
-fn has_the_effects_of(model: &Model, other: &Model) -> bool {
+pub(crate) fn has_the_effects_of(model: &Model, other: &Model) -> bool {
     let effects = |model: &Model| -> BTreeSet<(&str, Vec<&str>)> {
         let of = |effect: &Attached| (effect.meta.id, effect.at.iter().map(|c| c.id).collect());
         model.effects.iter().map(of).collect()

@@ -49,6 +49,8 @@ pub enum FaultKind {
     Wrapped,
     /// A column that does not say its unit; SI was assumed.
     UnitAssumed,
+    /// A column whose `scale` does once more what its unit does already.
+    ScaledTwice,
     /// A file that ends too early; what is before the cut was read.
     CutLog,
     /// A length that cannot be.
@@ -79,6 +81,7 @@ impl FaultKind {
             FaultKind::UnsignedVoltage => "unsigned_voltage",
             FaultKind::Wrapped => "wrapped",
             FaultKind::UnitAssumed => "unit_assumed",
+            FaultKind::ScaledTwice => "scaled_twice",
             FaultKind::CutLog => "cut_log",
             FaultKind::Implausible => "implausible",
         }

@@ -379,11 +379,39 @@ impl Finder<'_> {
                 1.0
             }
         };
+        if let (Some(unit), None) = (unit, scale_unit) {
+            self.check_scale(&header, id, (unit, si), factor, scale);
+        }
         Ok(Link {
             column,
             factor: factor * scale,
             offset: 0.0,
         })
+    }
+
+    /// Tells of a `scale` that is the `factor` from a column's unit to that of the model: whoever gives it does not expect that the
+    /// unit is known. It may be rounded to three digits.
+    fn check_scale(
+        &mut self,
+        header: &str,
+        id: &str,
+        (unit, si): (&str, &str),
+        factor: f64,
+        scale: f64,
+    ) {
+        let is_one = (factor - 1.0).abs() < 1e-3;
+        if !is_one && (scale / factor - 1.0).abs() < 1e-3 {
+            let detail = format!(
+                "the column `{header}` is in {unit}, and becomes {si} by itself; a `scale` of {scale} makes that of it once more: leave it \
+                 out, or say `unit = \"{si}\"`"
+            );
+            self.notes.push(Fault {
+                kind: FaultKind::ScaledTwice,
+                run: String::new(),
+                signal: id.into(),
+                detail,
+            });
+        }
     }
 
     /// Whether a column changes and holds nothing but whole numbers, which no angle in radians does.

@@ -46,6 +46,33 @@ fn series(recording: &Recording) -> (Vec<f64>, Vec<f64>) {
 }
 
 #[test]
+fn a_scale_that_converts_once_more_is_told() {
+    let text = "time_s,u_V,w_rpm\n0,5,30\n0.5,6,60\n1,7,90\n";
+    let told = |scale: f64, unit: Option<&str>| {
+        let mut log = from("u_V", "w_rpm");
+        let speed = log.measured.get_mut("speed").unwrap();
+        (speed.scale, speed.unit) = (Some(scale), unit.map(str::to_owned));
+        let recording = mapped(text, &log).unwrap();
+        let faults = recording.faults.iter();
+        let twice = faults.filter(|f| f.kind == FaultKind::ScaledTwice);
+        twice.map(|f| f.detail.clone()).next()
+    };
+    let detail = told(0.10472, None).unwrap();
+    assert!(
+        detail.contains("is in rpm") && detail.contains("`unit = \"rad/s\"`"),
+        "{detail}"
+    );
+    for (scale, unit) in [
+        (1.0, None),
+        (-1.0, None),
+        (0.5, None),
+        (0.10472, Some("rad/s")),
+    ] {
+        assert_eq!(told(scale, unit), None, "{scale}");
+    }
+}
+
+#[test]
 fn sums_and_differences_in_the_unit_of_the_first() {
     let text =
         "time_s,plus_V,minus_mV,a_rad_per_s,b_rpm\n0,5,1000,1,30\n0.5,6,1000,2,30\n1,7,2000,3,60\n";

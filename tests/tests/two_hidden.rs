@@ -65,6 +65,45 @@ fn a_pendulum_rubs_and_its_sensor_is_off() {
     check(&improved(model, &log), &effects, &values);
 }
 
+/// A heat sink that radiates, of which a sensor with a lag tells the temperature above a room of 22 °C.
+///
+/// A power of its input explains most at first, and beside that a late input. Beside the drag that the power becomes then, it is the
+/// lag, and the last step's error is that of the two.
+#[test]
+fn a_heat_sink_radiates_and_its_sensor_lags() {
+    let mut random = Random::new(2);
+    let (mut sink, mut sensor, mut power, mut until) = (0.0f64, 0.0f64, 0.0, 0);
+    let mut log = "time_s,power_W,temp_C\n".to_owned();
+    for k in 0..18_000 {
+        if k == until {
+            power = (400.0 * random.share()).round() / 10.0;
+            until = k + 10 * (60 + random.below(340));
+        }
+        if k % 10 == 0 {
+            let read = 22.0 + sensor + 0.05 * random.noise();
+            writeln!(log, "{},{power:.1},{read:.2}", k / 10).unwrap();
+        }
+        sink += 0.1 * (power - 0.55 * sink - 0.004 * sink * sink) / 80.0;
+        sensor += 0.1 * (sink - sensor) / 9.0;
+    }
+    let model = "[plant.expression.states]\nT = { unit = \"K\", rate = \"(p - g * T + sink) / c\" }\n\
+         [plant.expression.inputs]\np = { unit = \"W\" }\n\
+         [plant.expression.channels]\nsink = { unit = \"W\", flow = \"T\" }\n\
+         [plant.expression.parameters]\ng = { value = 0.7, unit = \"W/K\" }\n\
+         c = { value = 100, unit = \"J/K\" }\n\
+         [log.inputs]\np = \"power_W\"\n\
+         [log.measured]\nT = { column = \"temp_C\", offset = -295.15 }\n";
+    let found = improved(model, &log);
+    let values = [
+        ("quadratic_drag.coefficient", 0.004),
+        ("sensor_lag.lag", 9.0),
+    ];
+    check(&found, &["quadratic_drag", "sensor_lag"], &values);
+    let last = found["steps"].as_array().unwrap().last().unwrap();
+    let left = last["nrmse_test"].as_f64().unwrap();
+    assert!(left < 0.005, "{left}");
+}
+
 /// A robot that balances on two wheels, of which the wheels rub and the pitch is read 1.7° too large.
 ///
 /// Friction of two directions explains most at first. It is two effects, dry friction and a constant force, and a pitch that is off

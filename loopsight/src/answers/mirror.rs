@@ -143,6 +143,8 @@ mirror! {
         Wrapped,
         /// A column that does not say its unit; SI was assumed.
         UnitAssumed,
+        /// A column whose `scale` does once more what its unit does already.
+        ScaledTwice,
         /// A file that ends too early; what is before the cut was read.
         CutLog,
         /// A length that cannot be.

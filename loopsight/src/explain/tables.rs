@@ -71,7 +71,7 @@ pub(super) static TABLES: [PartMeta; 3] = [
             key(
                 "inputs.ID.scale",
                 "",
-                "factor; `-1` turns the sign; by default 1",
+                "factor, besides that of the unit; `-1` turns the sign; by default 1. One that is just the factor of the unit gets a warning",
             ),
             key(
                 "inputs.ID.scale_unit",
