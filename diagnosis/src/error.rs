@@ -2,6 +2,7 @@
 
 use loopsight_model::regression::RegressionError;
 
+use crate::figure::figure;
 use crate::progress::Cancelled;
 
 /// Why a model cannot be compared with measurements.
@@ -30,8 +31,9 @@ pub enum CompareError {
     NoSamples,
     /// The simulation diverged.
     #[error(
-        "the free run{} diverges after {time:.3} s: the model is unstable with these parameters",
-        of_run(run)
+        "the free run{} diverges after {} s: the model is unstable with these parameters",
+        of_run(run),
+        figure(*time, 3)
     )]
     Diverged {
         /// The run.

@@ -91,6 +91,7 @@ mod estimates;
 mod excerpt;
 mod experiment;
 mod explain;
+mod figure;
 mod first;
 mod fit;
 mod fitted;

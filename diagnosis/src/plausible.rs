@@ -4,6 +4,7 @@ use loopsight_model::run::Run;
 
 use crate::candidates::Candidate;
 use crate::commands::{largest_at, largest_inputs};
+use crate::figure::figure;
 use crate::positions::Positions;
 
 /// Why, at these `values`, an effect cannot be what it says; none where it can.
@@ -34,7 +35,8 @@ pub(crate) fn implausible(candidate: &Candidate, values: &[f64], runs: &[Run]) -
         let value = values.get(i)?.abs();
         (largest > 0.0 && value > largest).then(|| {
             let (name, unit) = (&parameter.name, &parameter.unit);
-            format!("{name}: {value:.3} {unit} is beyond the largest command, {largest:.3} {unit}")
+            let [value, largest] = [value, largest].map(|size| figure(size, 3));
+            format!("{name}: {value} {unit} is beyond the largest command, {largest} {unit}")
         })
     })
 }

@@ -5,6 +5,7 @@ use loopsight_model::run::Run;
 
 use crate::conclusion::Advice;
 use crate::criteria::LogCriteria;
+use crate::figure::{figure, significant};
 use crate::floor::rounding;
 use crate::holdout::deviations;
 
@@ -80,16 +81,17 @@ pub(crate) fn reasons(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Ve
         });
     };
     let duration: f64 = runs.iter().map(Run::duration).sum();
+    let enough = significant(10.0 * least, 3);
     if duration < least {
         say(
-            format!("the runs last {duration:.2} s in all"),
-            "record at least ten times the slowest time constant, 20 s as a rule",
+            format!("the runs last {} s in all", figure(duration, 2)),
+            &format!("record at least ten times the slowest time constant, {enough} s as a rule"),
         );
     }
     let longest = runs.iter().map(Run::duration).fold(0.0, f64::max);
     if (criteria.run_s..f64::INFINITY).contains(&duration) && longest < criteria.run_s {
         say(
-            format!("no run is longer than {longest:.2} s"),
+            format!("no run is longer than {} s", figure(longest, 2)),
             "record longer runs without a gap",
         );
     }
@@ -116,9 +118,13 @@ pub(crate) fn reasons(model: &Model, runs: &[Run], criteria: &LogCriteria) -> Ve
     if moving > 0.0 && moving < least && duration >= least {
         say(
             format!(
-                "something moves in {moving:.2} s of {duration:.2} s only; in the other runs no measured signal changes"
+                "something moves in {} s of {} s only; in the other runs no measured signal changes",
+                figure(moving, 2),
+                figure(duration, 2)
             ),
-            "record runs in which the machine moves, with inputs above its friction, 20 s as a rule",
+            &format!(
+                "record runs in which the machine moves, with inputs above its friction, {enough} s as a rule"
+            ),
         );
     }
     if let Some(why) = too_coarse(model, runs, criteria) {

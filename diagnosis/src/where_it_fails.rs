@@ -7,6 +7,7 @@ use loopsight_model::simulate::{Simulator, try_follow};
 use serde::Serialize;
 
 use crate::criteria::FailsCriteria;
+use crate::figure::{pair, significant};
 use crate::floor::rounding;
 use crate::long::Thinned;
 use crate::motion::{Motion, changes, rest, speed};
@@ -240,7 +241,7 @@ fn after_change(
         let said = format!(
             "{:.0} % of the squared error of {name} lies within {} s after a {}, which is {:.0} % of the time",
             100.0 * error,
-            criteria.after_change_s,
+            significant(criteria.after_change_s, 4),
             motion.change(),
             100.0 * part
         );
@@ -274,8 +275,9 @@ fn by_direction(
     let part = explained / all;
     (part > criteria.directions).then(|| {
         let [ahead, back] = motion.directions(unit);
+        let [forwards, backwards] = pair([forwards, backwards], 3);
         let said = format!(
-            "the mean residual of {name} is {forwards:+.3} {unit} {ahead} and {backwards:+.3} {unit} {back}"
+            "the mean residual of {name} is {forwards} {unit} {ahead} and {backwards} {unit} {back}"
         );
         (said, part)
     })

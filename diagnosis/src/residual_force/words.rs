@@ -3,6 +3,8 @@
 use loopsight_model::expression::{EffectDraft, ParameterDraft};
 use loopsight_model::model::Model;
 
+use crate::figure::significant;
+
 use super::dependence::ForceDependence;
 use super::known::resembles;
 use super::place::{Group, Law};
@@ -110,7 +112,7 @@ fn draft(name: &str, group: &Group, law: &Law) -> (EffectDraft, String) {
             format!("c{}", k + 1)
         };
         let text = shape.text(&mut |variable, value| {
-            let value = rounded(value);
+            let value = significant(value, DIGITS);
             let known = scales.iter().find(|s| s.value == Some(value));
             if let Some(known) = known {
                 return known.id.clone();
@@ -124,7 +126,7 @@ fn draft(name: &str, group: &Group, law: &Law) -> (EffectDraft, String) {
                 id: id.clone(),
                 value: Some(value),
                 unit: unit_of(group, variable),
-                range: Some([value / 10.0, value * 10.0].map(rounded)),
+                range: Some([value / 10.0, value * 10.0].map(|v| significant(v, DIGITS))),
                 held: true,
                 doc: match shape {
                     Shape::Radiation(..) => {
@@ -138,8 +140,8 @@ fn draft(name: &str, group: &Group, law: &Law) -> (EffectDraft, String) {
             });
             id
         });
-        let bare = shape.text(&mut |_, value| rounded(value).to_string());
-        let number = rounded(*number);
+        let bare = shape.text(&mut |_, value| significant(value, DIGITS).to_string());
+        let number = significant(*number, DIGITS);
         let (times, plainly) = match shape {
             Shape::One => (id.clone(), format!("{}", number.abs())),
             _ => (
@@ -211,18 +213,4 @@ fn coefficient_unit(group: &Group, force: &str, shape: &Shape) -> String {
         });
     }
     unit
-}
-
-/// To four significant digits.
-fn rounded(value: f64) -> f64 {
-    if value == 0.0 || !value.is_finite() {
-        return value;
-    }
-    let digits = (DIGITS - 1 - value.abs().log10().floor() as i32).clamp(-15, 15);
-    let shift = 10f64.powi(digits.abs());
-    if digits >= 0 {
-        (value * shift).round() / shift
-    } else {
-        (value / shift).round() * shift
-    }
 }
