@@ -125,19 +125,24 @@ pub(crate) fn largest_at(model: &Model, channel: &Channel, largest: &[f64]) -> O
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use loopsight_plants as _;
 
     use super::*;
 
-    /// A mirror that a coil turns with 4 mN m/A, and which a friction holds that is not asked.
+    /// A mirror that a coil turns with 4 mN m/A; effects may follow.
+    pub(crate) const MIRROR: &str = "[plant.expression.states]\nspeed = { unit = \"rad/s\", rate = \"(0.004 * current - 1e-5 * speed + axle) / 2e-8\" }\n\
+        [plant.expression.inputs]\ncurrent = { unit = \"A\" }\n\
+        [plant.expression.channels]\naxle = { unit = \"N m\", flow = \"speed\" }\n\
+        [log.measured.speed]\n";
+
+    /// A friction that no coil overcomes is not asked.
     #[test]
     fn a_current_is_worth_the_torque_that_it_makes() {
-        let text = "[plant.expression.states]\nspeed = { unit = \"rad/s\", rate = \"(0.004 * current - 1e-5 * speed + axle) / 2e-8\" }\n\
-                    [plant.expression.inputs]\ncurrent = { unit = \"A\" }\n\
-                    [plant.expression.channels]\naxle = { unit = \"N m\", flow = \"speed\" }\n\
-                    [log.measured.speed]\n[[effect]]\n[effect.coulomb_friction]\nat = [\"axle\"]\nlevel = 5.0\n";
-        let (model, _) = Model::from_toml("mirror.toml", text).unwrap();
+        let text = format!(
+            "{MIRROR}[[effect]]\n[effect.coulomb_friction]\nat = [\"axle\"]\nlevel = 5.0\n"
+        );
+        let (model, _) = Model::from_toml("mirror.toml", &text).unwrap();
         let mut run = Run::empty(1, 1);
         for k in 0..10 {
             let current = if k < 5 { 1.5 } else { -2.0 };

@@ -92,16 +92,16 @@ mod tests {
     use loopsight_plants as _;
 
     use super::*;
+    use crate::commands::tests::MIRROR;
 
-    /// A mirror that a coil turns with 4 mN m/A, sampled at 100 kHz.
+    /// The mirror is sampled at 100 kHz.
     #[test]
     fn effects_of_a_model_are_as_small_and_as_fast_as_its_machine() {
-        let text = "[plant.expression.states]\nspeed = { unit = \"rad/s\", rate = \"(0.004 * current - 1e-5 * speed + axle) / 2e-8\" }\n\
-                    [plant.expression.inputs]\ncurrent = { unit = \"A\" }\n\
-                    [plant.expression.channels]\naxle = { unit = \"N m\", flow = \"speed\" }\n\
-                    [log.measured.speed]\n[[effect]]\n[effect.coulomb_friction]\nat = [\"axle\"]\n\
-                    [[effect]]\n[effect.input_delay]\nat = [\"input\"]\n";
-        let (given, _) = Model::from_toml("mirror.toml", text).unwrap();
+        let text = format!(
+            "{MIRROR}[[effect]]\n[effect.coulomb_friction]\nat = [\"axle\"]\n\
+             [[effect]]\n[effect.input_delay]\nat = [\"input\"]\n"
+        );
+        let (given, _) = Model::from_toml("mirror.toml", &text).unwrap();
         let mut run = Run::empty(1, 1);
         for k in 0..2000 {
             let current = if k % 40 < 20 { 2.0 } else { -2.0 };

@@ -7,7 +7,7 @@ use crate::commands::Commands;
 use crate::ends::{Ends, limited};
 
 /// Sets the smoothing width of the last effect of `model` to `sign_width` times the flow in the recording, and
-/// the commands that its sizes refer to: of root mean squares `rms` of the signals, and `largest` inputs. Returns the root
+/// what its sizes refer to: root mean squares `rms` of the signals, and the largest `commands`. Returns the root
 /// mean square of the flow at its channels.
 pub(crate) fn suit(model: &mut Model, rms: &[f64], commands: &Commands, sign_width: f64) -> f64 {
     let flow = last_rms(model, Role::Flow, rms);

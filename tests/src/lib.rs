@@ -27,6 +27,7 @@ use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_model::sensor::Sensor;
 use loopsight_plants as _;
+use serde_json::Value;
 
 /// The top folder of the repository.
 pub fn repository() -> PathBuf {
@@ -146,6 +147,35 @@ impl Random {
     pub fn below(&mut self, end: usize) -> usize {
         ((self.bits() >> 33) as usize) % end
     }
+}
+
+/// Checks the effects that `improve` added, in any order, and that values of parameters are what they were made, to a share
+/// of `within`. What it answered is `found`.
+///
+/// # Panics
+///
+/// Where they are not, or the answer lacks its keys.
+pub fn check_improved(found: &Value, effects: &[&str], values: &[(&str, f64)], within: f64) {
+    let steps = found["steps"].as_array().unwrap().iter();
+    let mut added: Vec<&str> = steps
+        .filter_map(|s| s["added"]["effect"].as_str())
+        .collect();
+    added.sort_unstable();
+    assert_eq!(added, effects);
+    for (name, made) in values {
+        let value = found["parameters"][name]["value"].as_f64().unwrap();
+        assert!((value / made - 1.0).abs() < within, "{name} {value}");
+    }
+}
+
+/// The error that the last step of `improve` left on data it did not see.
+///
+/// # Panics
+///
+/// Where the answer lacks its keys.
+pub fn last_error(found: &Value) -> f64 {
+    let last = found["steps"].as_array().unwrap().last().unwrap();
+    last["nrmse_test"].as_f64().unwrap()
 }
 
 /// A page with the charts' data as they were before they were packed; the charts' library is left as it is.

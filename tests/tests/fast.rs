@@ -7,7 +7,7 @@
 
 use std::fmt::Write;
 
-use loopsight_tests::Random;
+use loopsight_tests::{Random, check_improved, last_error};
 use serde_json::Value;
 
 mod sessions;
@@ -16,17 +16,8 @@ use sessions::improved;
 
 /// Checks the effects that were added, in any order, that parameters of them are what they were made to 2 %, and that hardly anything is left.
 fn check(found: &Value, effects: &[&str], values: &[(&str, f64)], left: f64) {
-    let steps = found["steps"].as_array().unwrap();
-    let mut added: Vec<&str> = (steps.iter())
-        .filter_map(|s| s["added"]["effect"].as_str())
-        .collect();
-    added.sort_unstable();
-    assert_eq!(added, effects);
-    for (name, made) in values {
-        let value = found["parameters"][name]["value"].as_f64().unwrap();
-        assert!((value / made - 1.0).abs() < 0.02, "{name} {value}");
-    }
-    let last = steps.last().unwrap()["nrmse_test"].as_f64().unwrap();
+    check_improved(found, effects, values, 0.02);
+    let last = last_error(found);
     assert!(last < left, "{last}");
 }
 

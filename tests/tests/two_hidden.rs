@@ -7,26 +7,11 @@
 
 use std::fmt::Write;
 
-use loopsight_tests::Random;
-use serde_json::Value;
+use loopsight_tests::{Random, check_improved, last_error};
 
 mod sessions;
 
 use sessions::improved;
-
-/// Checks the effects that were added, in any order, and the values of some parameters to 5 %.
-fn check(found: &Value, effects: &[&str], values: &[(&str, f64)]) {
-    let steps = found["steps"].as_array().unwrap().iter();
-    let mut added: Vec<&str> = steps
-        .filter_map(|s| s["added"]["effect"].as_str())
-        .collect();
-    added.sort_unstable();
-    assert_eq!(added, effects);
-    for (name, made) in values {
-        let value = found["parameters"][name]["value"].as_f64().unwrap();
-        assert!((value / made - 1.0).abs() < 0.05, "{name} {value}");
-    }
-}
 
 /// A pendulum of which the angle sensor is off by 0.1 rad and whose bearing rubs. Its command changes between the samples.
 #[test]
@@ -62,7 +47,7 @@ fn a_pendulum_rubs_and_its_sensor_is_off() {
         ("sensor_offset.offset", off),
         ("kt", 0.2),
     ];
-    check(&improved(model, &log), &effects, &values);
+    check_improved(&improved(model, &log), &effects, &values, 0.05);
 }
 
 /// A heat sink that radiates, of which a sensor with a lag tells the temperature above a room of 22 °C.
@@ -98,9 +83,8 @@ fn a_heat_sink_radiates_and_its_sensor_lags() {
         ("quadratic_drag.coefficient", 0.004),
         ("sensor_lag.lag", 9.0),
     ];
-    check(&found, &["quadratic_drag", "sensor_lag"], &values);
-    let last = found["steps"].as_array().unwrap().last().unwrap();
-    let left = last["nrmse_test"].as_f64().unwrap();
+    check_improved(&found, &["quadratic_drag", "sensor_lag"], &values, 0.05);
+    let left = last_error(&found);
     assert!(left < 0.005, "{left}");
 }
 
@@ -170,5 +154,5 @@ fn a_balancing_robot_rubs_and_its_pitch_is_off() {
         ("kt", 0.8),
     ];
     let effects = ["coulomb_friction", "sensor_offset"];
-    check(&improved(model, &log), &effects, &values);
+    check_improved(&improved(model, &log), &effects, &values, 0.05);
 }
