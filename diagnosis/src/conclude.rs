@@ -152,10 +152,13 @@ impl Evidence<'_> {
 
     /// Least share of the standard deviation that an explanation must account for where it lowers an `error` to what is
     /// `left`. What removes nearly all of a small error is no imperfection of a sensor: an angle that wanders by many turns has
-    /// a large standard deviation, and whatever is missing a small share of it.
+    /// a large standard deviation, and whatever is missing a small share of it. Where hardly anything is left, it need not be
+    /// a part of a first error that was several times as large either.
     fn least(&self, error: f64, left: f64) -> f64 {
         let criteria = self.missing();
-        if left <= criteria.most_left * error {
+        if left <= criteria.most_left.powi(2) * error {
+            self.worth.min(criteria.least_share)
+        } else if left <= criteria.most_left * error {
             self.worth
         } else {
             self.worth.max(criteria.least_share)

@@ -35,6 +35,7 @@ use crate::signs::{self, SoFar};
 use crate::stamps;
 use crate::starts::Extent;
 use crate::sufficiency;
+use crate::telling::held_to_measurements;
 use crate::trial::{FINAL, Judged, Nominal};
 use crate::untried::untried;
 use crate::where_it_fails::{predictable, where_it_fails};
@@ -413,6 +414,20 @@ fn solve_plain(
     Ok((plain, fitted))
 }
 
+/// Root mean squares of the plant's signals, which say how fast and how far it goes. Where the inputs alone do not explain half of what is
+/// measured, they are those of the machine, as an observer sees it.
+fn rms(nominal: &Nominal<'_>, work: &Work<'_>) -> Result<Vec<f64>, Cancelled> {
+    let (model, solution) = (nominal.model, nominal.solution);
+    let runs = nominal.holdout.runs;
+    let lost = nrmse(nominal.rank) >= work.criteria().start.stands;
+    let runs = if lost {
+        held_to_measurements(model, &solution.values, runs, work)?
+    } else {
+        Cow::Borrowed(runs)
+    };
+    signal_rms(model, &solution.values, &solution.states, &runs, work)
+}
+
 /// The candidates that explain most, fitted. The diagnosis lists them, the best first. What the search reads may be
 /// windows, `parts_of_one` run.
 fn search(
@@ -421,13 +436,7 @@ fn search(
     parts_of_one: bool,
     work: &Work<'_>,
 ) -> Result<Vec<Judged>, Cancelled> {
-    let rms = signal_rms(
-        nominal.model,
-        &nominal.solution.values,
-        &nominal.solution.states,
-        nominal.holdout.runs,
-        work,
-    )?;
+    let rms = rms(nominal, work)?;
     let ends = ends(
         nominal.model,
         &nominal.solution.values,

@@ -39,6 +39,25 @@ pub(crate) fn attach_telling<'r>(
     }
 }
 
+/// `runs` with an observer that forgets as soon as one may, for a `model` whose free runs say nothing of how the machine moves: that
+/// of a motor whose gain a fit has made small stands still.
+pub(crate) fn held_to_measurements<'r>(
+    model: &Model,
+    values: &[f64],
+    runs: &'r [Run],
+    work: &Work<'_>,
+) -> Result<Cow<'r, [Run]>, Cancelled> {
+    if runs.iter().any(|run| run.observer().is_some()) {
+        return Ok(Cow::Borrowed(runs));
+    }
+    let soonest = Growth {
+        horizon: SHORTEST * shortest_period(runs),
+        doubling: None,
+        observed: (0..model.n_states()).collect(),
+    };
+    attach_observer_for(model, values, runs, &soonest, work)
+}
+
 /// What the model leaves of `runs`, as a share of the signals' deviations, with some `values`, or those that are fitted with an
 /// `effort` from them.
 fn left(

@@ -55,6 +55,7 @@ fn simulate<S: registry::HostReal>(model: &Model, values: &[S]) -> Vec<Vec<S>> {
 /// The largest difference of two simulations, by signal, relative to the size of the second.
 fn difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     let signals = a[0].len();
+    assert!(signals > 0, "nothing is compared");
     (0..signals)
         .map(|i| {
             let largest = b.iter().fold(0.0f64, |m, y| m.max(y[i].abs()));
@@ -460,35 +461,48 @@ fn a_pushed_rate_is_a_slope() {
 }
 
 /// A shaft that sticks is the fastest that a model knows. A step that is too long for it would make the derivatives grow
-/// without end.
+/// without end. Friction may hold it in one direction only.
 #[test]
 fn derivatives_are_exact_where_friction_is_sharp() {
-    let text = format!(
-        "{AXIS}[[effect]]\n[effect.coulomb_friction]\nat = [\"shaft\"]\nlevel = 2.0\nwidth = 0.003\n"
-    );
-    let axis = model(&text);
-    let values = axis.values();
-    let level = axis
-        .parameters
-        .iter()
-        .position(|p| p.name == "coulomb_friction.level");
-    let level = level.unwrap();
-    let found = derivatives(&axis, &values, level);
-    let moved = |change: f64| {
-        let mut values = values.clone();
-        values[level] += change;
-        simulate(&axis, &values)
-    };
-    let change = 1e-5;
-    let (more, less) = (moved(change), moved(-change));
-    let by_difference: Vec<Vec<f64>> = (more.iter().zip(&less))
-        .map(|(a, b)| {
-            a.iter()
-                .zip(b)
-                .map(|(a, b)| (a - b) / (2.0 * change))
-                .collect()
-        })
-        .collect();
-    let off = difference(&found, &by_difference);
-    assert!(off < 1e-3, "{off}");
+    for (effect, sizes) in [
+        ("coulomb_friction", "level = 6.0"),
+        (
+            "directional_friction",
+            "level_forward = 6.0\nlevel_backward = 0.0",
+        ),
+        (
+            "directional_friction",
+            "level_backward = 6.0\nlevel_forward = 0.0",
+        ),
+    ] {
+        let text = format!(
+            "{AXIS}[log.measured]\nspeed = \"speed\"\n[[effect]]\n[effect.{effect}]\nat = [\"shaft\"]\n{sizes}\nwidth = 0.003\n"
+        );
+        let axis = model(&text);
+        let values = axis.values();
+        let level = format!("{effect}.{}", sizes.split(' ').next().unwrap());
+        let level = axis
+            .parameters
+            .iter()
+            .position(|p| p.name == level)
+            .unwrap();
+        let found = derivatives(&axis, &values, level);
+        let moved = |change: f64| {
+            let mut values = values.clone();
+            values[level] += change;
+            simulate(&axis, &values)
+        };
+        let change = 1e-5;
+        let (more, less) = (moved(change), moved(-change));
+        let by_difference: Vec<Vec<f64>> = (more.iter().zip(&less))
+            .map(|(a, b)| {
+                a.iter()
+                    .zip(b)
+                    .map(|(a, b)| (a - b) / (2.0 * change))
+                    .collect()
+            })
+            .collect();
+        let off = difference(&found, &by_difference);
+        assert!(off < 1e-3, "{effect}, {sizes}: off {off}");
+    }
 }

@@ -1,7 +1,7 @@
 //! Steps that are short enough for what sticks.
 
 use super::Simulator;
-use super::stiff::{STABLE, Way};
+use super::stiff::{FROM_REST, STABLE, Way};
 use crate::registry::HostReal;
 
 /// Share of the usual step below which none is shortened: friction that would need more has no sensible width.
@@ -11,7 +11,6 @@ const WIDE: f64 = 1e9;
 /// Widths beyond which a speed is so far from rest that nothing sticks: a sign that is a hyperbolic tangent has a slope of 8e-9
 /// of that at rest there.
 const FAR: f64 = 10.0;
-
 impl<S: HostReal> Simulator<'_, S> {
     /// Makes the longest step so short that it is stable where dry friction holds the machine at rest, and lets none be longer
     /// than usual, or as long as the motion allows, that would not be stable.
@@ -32,7 +31,7 @@ impl<S: HostReal> Simulator<'_, S> {
         if as_usual && !self.model.by_motion {
             return;
         }
-        let sticking = self.fastest_at_rest();
+        let sticking = self.fastest_either_way(!widths.is_empty());
         self.watched.stable = [STABLE / sticking; 2];
         if self.model.by_motion {
             self.watched.slow = self.slow(&widths);
@@ -80,6 +79,22 @@ impl<S: HostReal> Simulator<'_, S> {
             }
         }
         slow
+    }
+
+    /// The fastest rate at rest, 1/s, and where there are `signs` that when the machine hardly goes the other way: friction may hold it in
+    /// one direction only. At rest rates are compared with those a little above it.
+    fn fastest_either_way(&mut self, signs: bool) -> f64 {
+        let at_rest = self.fastest_at_rest();
+        if !signs {
+            return at_rest;
+        }
+        let rest = self.x.clone();
+        for x in &mut self.x {
+            *x -= S::of(2.0 * FROM_REST);
+        }
+        let other = self.fastest_at_rest();
+        self.x = rest;
+        at_rest.max(other)
     }
 
     /// The fastest rate at rest, 1/s.

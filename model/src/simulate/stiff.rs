@@ -8,6 +8,10 @@ use nalgebra::DMatrix;
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 /// Difference for the Jacobian, relative to a state: the root of the rounding error.
 const DIFFERENCE: f64 = 1e-8;
+/// Size of a state that is nearly zero.
+const LEAST: f64 = 1e-3;
+/// Difference for a state at rest.
+pub(super) const FROM_REST: f64 = LEAST * DIFFERENCE;
 /// Share by which a slope may differ between a small and a large difference and still be that of a straight line: rounding
 /// of the small one makes less.
 const CURVED: f64 = 0.1;
@@ -106,7 +110,7 @@ impl<S: HostReal> Implicit<S> {
         f(0, x, &mut self.rate);
         self.stage.copy_from_slice(x);
         for (j, at) in x.iter().enumerate() {
-            let size = at.value().abs().max(1e-3);
+            let size = at.value().abs().max(LEAST);
             self.column(j, *at, DIFFERENCE * size, &mut f);
             // Far from where it settles, and near zero, a state's rate is a difference of large terms. Their rounding must
             // be small beside the change as well.
