@@ -1,7 +1,7 @@
 //! The candidates of a diagnosis: every effect at every channel where it could be added to the model.
 
-use loopsight_core::{EffectMeta, Role};
-use loopsight_model::model::{Model, ModelParameter};
+use loopsight_core::EffectMeta;
+use loopsight_model::model::Model;
 use loopsight_model::registry;
 use loopsight_model::run::Run;
 
@@ -10,11 +10,11 @@ use crate::criteria::SearchCriteria;
 use crate::ends::Ends;
 use crate::estimate::ParameterVerdict;
 use crate::fitted::Fit;
+use crate::moves::Moves;
 use crate::places::{channel_sets, has_another_name, unshown_part};
 use crate::positions::Positions;
 use crate::shows::can_show;
-use crate::sizes::powers;
-use crate::suited::{is_per_way, last_ends, last_rms, smooth, suit, widths};
+use crate::suited::{is_per_way, last_ends, smooth, suit, widths};
 
 /// An effect at a set of channels.
 #[derive(Clone, Debug)]
@@ -30,12 +30,8 @@ pub(crate) struct Candidate {
     pub(crate) replaces: Option<(&'static str, std::ops::Range<usize>)>,
     /// The model with it, at neutral parameters.
     pub(crate) model: Model,
-    /// Root mean square of the flow at its channels in the recording; 0 where there is none.
-    pub(crate) flow: f64,
-    /// The same of the position.
-    pub(crate) reach: f64,
-    /// The largest command in the recording, in the unit of its channels; none where no input has that.
-    pub(crate) command: Option<f64>,
+    /// How its channels move in the recording.
+    pub(crate) moves: Moves,
     /// Where the position (or head) at its channels ends in the recording.
     pub(crate) ends: Ends,
     /// It can be tried at the measured positions: it reads a position, and no observer corrects the free runs.
@@ -46,36 +42,7 @@ pub(crate) struct Candidate {
     pub(crate) entries: Option<String>,
 }
 
-/// Share of the largest command that a coefficient moves at most where a candidate begins: beyond it the start is another machine,
-/// whose free run says nothing of this one.
-const START: f64 = 0.1;
-
 impl Candidate {
-    /// How far from neutral one of its parameters begins. That is the size of the declaration, for machines that move by a radian or
-    /// a metre in a second. A coefficient of a power of a speed or a way moves a tenth of the largest command at most: at a
-    /// wheel that turns with 600 rad/s the declared size of a drag is 8000 V.
-    pub(crate) fn first_step(&self, parameter: &ModelParameter) -> f64 {
-        let declared = parameter.scale();
-        let moves = self
-            .way(parameter.declaration.unit)
-            .map(|way| declared * way);
-        match (moves, self.command) {
-            (Some(moves), Some(command)) if moves > START * command && command > 0.0 => {
-                declared * START * command / moves
-            }
-            _ => declared,
-        }
-    }
-
-    /// What a coefficient of `unit` is multiplied with in the recording; none where it is no coefficient of speeds and ways.
-    fn way(&self, unit: &str) -> Option<f64> {
-        let moved = |(role, power)| match role {
-            Role::Flow => self.flow.powi(power),
-            _ => self.reach.powi(power),
-        };
-        powers(unit)?.map(|way| way.map(moved)).product()
-    }
-
     /// Parameters of the model that the candidate brought, by index.
     pub(crate) fn own(&self) -> std::ops::Range<usize> {
         let first = self.model.effects.len() - self.instances();
@@ -138,7 +105,7 @@ impl Candidate {
     pub(crate) fn smoothed(&self, share: f64) -> Option<Self> {
         let mut sharp = self.clone();
         let n = self.instances();
-        smooth(&mut sharp.model, n, share * sharp.flow).then_some(sharp)
+        smooth(&mut sharp.model, n, share * sharp.moves.flow).then_some(sharp)
     }
 
     /// Its own widths over which signs are smoothed.
@@ -151,7 +118,7 @@ impl Candidate {
     /// Such an effect only sharpens the sign. Nor is one an effect of its own that gives way within the same share of the
     /// way: it is dry friction.
     pub(crate) fn drowns(&self, values: &[f64], criteria: &SearchCriteria) -> bool {
-        let shortest = criteria.sign_width * self.reach;
+        let shortest = criteria.sign_width * self.moves.reach;
         let at_once = self.own().any(|i| {
             let per_way = is_per_way(self.model.parameters[i].declaration);
             per_way && values.get(i).is_some_and(|rate| rate * shortest > 1.0)
@@ -338,6 +305,10 @@ pub(crate) fn candidates(
                     }
                 }
                 if let Some(mut model) = with {
+                    let moves = Moves {
+                        flow,
+                        ..Moves::of_last(&model, rms, &commands)
+                    };
                     let own = model.effects.last().map_or(0, |e| e.first_parameter);
                     for parameter in &mut model.parameters[own..] {
                         parameter.free |= *further && parameter.declaration.further;
@@ -350,11 +321,9 @@ pub(crate) fn candidates(
                         replaces: replaces.clone(),
                         by_position: !observed && Positions::matter_to(meta),
                         widths: widths(&model, rms, sign_width),
-                        reach: last_rms(&model, Role::Position, rms),
-                        command: last_command(&model, &commands),
                         ends: last_ends(&model, ends),
                         model,
-                        flow,
+                        moves,
                         entries: None,
                     });
                 }
@@ -362,11 +331,6 @@ pub(crate) fn candidates(
         }
     }
     found
-}
-
-/// The largest command in the unit of the channels of the last effect of a model.
-fn last_command(model: &Model, commands: &Commands) -> Option<f64> {
-    commands.at(model, model.effects.last()?.at.first()?)
 }
 
 #[cfg(test)]
@@ -378,35 +342,6 @@ mod tests {
     const ROBOT: &str = "[plant.ddmr]\nK_B = 0.0\nK_E = 0.0\nhalf_track = 0.3\nwheel_radius = 0.07\n\
                          [log.measured]\ntrack_speed_right = { sensor = \"instantaneous\" }\n\
                          track_speed_left = { sensor = \"instantaneous\" }\n";
-
-    /// A wheel that turns with 600 rad/s under 12 V, and one that turns with 0.1 rad/s.
-    #[test]
-    fn a_drag_begins_with_what_a_machine_can_have() {
-        let text = "[plant.dc_axis]\nK_A = -1.0\nK_C = 8.0\n[log.measured.speed]\n";
-        let (axis, _) = Model::from_toml("axis.toml", text).unwrap();
-        let step = |flow: f64| {
-            let model = axis.with_effect("quadratic_drag", &["shaft"]).unwrap();
-            let candidate = Candidate {
-                meta: model.effects[0].meta,
-                at: vec!["shaft"],
-                separate: false,
-                further: false,
-                replaces: None,
-                flow,
-                reach: 0.0,
-                command: last_command(&model, &Commands::within(vec![12.0])),
-                ends: [None; 2],
-                by_position: false,
-                widths: Vec::new(),
-                entries: None,
-                model,
-            };
-            candidate.first_step(&candidate.model.parameters[candidate.own().start])
-        };
-        let declared = 0.02;
-        assert!((step(600.0) * 600.0 * 600.0 / 1.2 - 1.0).abs() < 1e-12);
-        assert_eq!(step(0.1), declared);
-    }
 
     /// The candidates, where this part of the robot does not show; all where none is named.
     fn tried(unshown: Option<&str>) -> Vec<Candidate> {

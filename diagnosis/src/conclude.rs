@@ -126,10 +126,11 @@ impl Evidence<'_> {
 
     /// Whether the effect depends on what went before, in a model where something is late already. In the few steps of a log
     /// it would only give what is late another shape, and has room for whatever else is missing; so where it acts alike
-    /// in the rest of the log, steps are no evidence.
+    /// in the rest of the log, steps are no evidence. Another shape does not take most of the error away, though.
     fn reshapes(&self, judged: &Judged) -> bool {
         let effects = self.nominal.model.effects.iter();
-        judged.candidate.meta.is_dynamic() && effects.map(|e| e.meta).any(is_late)
+        let rest = nrmse(&judged.losses) > self.missing().most_left * self.error();
+        rest && judged.candidate.meta.is_dynamic() && effects.map(|e| e.meta).any(is_late)
     }
 
     /// Whether the starts of the runs show the effect. They are not validation data, because the initial state

@@ -3,6 +3,7 @@
 use crate::candidates::Candidate;
 use crate::conclusion::Explanation;
 use crate::explain::explain;
+use crate::moves::Moves;
 use crate::residual_force::ForceExpression;
 use crate::trial::{Judged, Nominal, finish, look};
 
@@ -54,9 +55,11 @@ fn candidate(expression: &ForceExpression, nominal: &Nominal<'_>) -> Option<Cand
         separate: added.len() > 1,
         further: false,
         replaces: None,
-        flow: 0.0,
-        command: None,
-        reach: 0.0,
+        moves: Moves {
+            flow: 0.0,
+            reach: 0.0,
+            command: None,
+        },
         ends: [None; 2],
         by_position: false,
         widths: Vec::new(),

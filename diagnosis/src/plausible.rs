@@ -47,6 +47,7 @@ mod tests {
     use loopsight_plants as _;
 
     use super::*;
+    use crate::moves::Moves;
 
     fn candidate(effect: &str, at: &'static str) -> Candidate {
         let text = "[plant.arm]\nK_A = -2.0\nK_C = 6.0\nK_G = 40.0\n[log.measured.angle]\n";
@@ -58,9 +59,11 @@ mod tests {
             separate: false,
             further: false,
             replaces: None,
-            flow: 1.0,
-            reach: 1.0,
-            command: None,
+            moves: Moves {
+                flow: 1.0,
+                reach: 1.0,
+                command: None,
+            },
             ends: [None; 2],
             by_position: false,
             widths: Vec::new(),

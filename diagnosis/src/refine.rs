@@ -14,8 +14,8 @@ use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
 use crate::progress::Work;
 use crate::refined::{Alike, Refined};
+use crate::sharpness::{sharpened, sharper, softened};
 use crate::split::split;
-use crate::suited::smooth;
 
 /// Corrects `model` after the last of `steps`:
 ///
@@ -23,7 +23,8 @@ use crate::suited::smooth;
 /// * a simpler effect replaces one that contains it, where the error hardly grows; so do two with fewer parameters;
 /// * an effect that the last of the `diagnoses` did not name is replaced by a twin, which the data could not tell from it when it
 ///   was added, where the error falls; by the same effect at fewer places only where nothing else is missing then;
-/// * the sign of the last effect is made sharper while the error falls.
+/// * the sign of the last effect is made sharper while the error falls, and those of the others softer
+///   where little but noise is left.
 ///
 /// The steps are changed with the model. If the work is cancelled, the two still agree. None where the last step is no
 /// more than another name for an earlier one; then nothing is changed. Otherwise what was tried in place of the model that
@@ -50,7 +51,9 @@ pub(crate) fn refine(
     let others = with_others(best.model, steps, diagnoses);
     best.try_all(&others)?;
     reconsidered(&mut best, steps, diagnoses)?;
-    sharpened(&mut best)?;
+    sharpened(&mut best, steps)?;
+    let floor = diagnoses.last().map_or(0.0, |last| last.floor.nrmse);
+    softened(&mut best, steps, floor)?;
     Ok(Some(best.fitted()))
 }
 
@@ -69,7 +72,7 @@ fn with_others(model: &Model, steps: &[ImprovementStep], diagnoses: &[Diagnosis]
     let earlier = steps.iter().filter(|step| is_earlier(step, diagnoses));
     let all = earlier.flat_map(twins);
     // The sharper sign takes longest.
-    sharper(model).into_iter().chain(all).collect()
+    sharper(model, steps).into_iter().chain(all).collect()
 }
 
 /// The models of some candidates.
@@ -422,38 +425,6 @@ pub(crate) fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
     (0..model.effects.len())
         .filter(|index| of_place(&model.effects[*index]))
         .collect()
-}
-
-/// Most halvings.
-const HALVINGS: usize = 3;
-
-/// Halves the smoothing width of the effect added last while that lowers the error.
-fn sharpened(best: &mut Refined<'_>) -> Result<(), FitError> {
-    let criteria = &best.work.criteria().improve;
-    for _ in 0..HALVINGS {
-        let Some(candidate) = sharper(best.model) else {
-            break;
-        };
-        let taken = best.takes(vec![((), candidate)], |_| criteria.sharper)?;
-        if taken.is_none() {
-            break;
-        }
-    }
-    Ok(())
-}
-
-/// The model with half the smoothing width of the effect added last; none where that has none.
-fn sharper(model: &Model) -> Option<Model> {
-    let mut candidate = model.clone();
-    let effect = candidate.effects.last()?;
-    let (meta, first) = (effect.meta, effect.first_parameter);
-    let added = candidate.effects.iter().rev();
-    let count = added.take_while(|e| e.meta.id == meta.id).count();
-    let width = (0..meta.parameters.len())
-        .find(|i| meta.parameters[*i].is_width())
-        .and_then(|i| candidate.parameters[first + i].value)?;
-    smooth(&mut candidate, count, 0.5 * width);
-    Some(candidate)
 }
 
 #[cfg(test)]

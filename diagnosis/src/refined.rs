@@ -6,11 +6,13 @@ use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use rayon::prelude::*;
 
+use crate::commands::Commands;
 use crate::compare::{error_over, free_run_error};
 use crate::error::{CompareError, FitError};
 use crate::measurements::Measurements;
 use crate::observer::{attach_observer, attach_same_observer};
 use crate::output_error::{Unaided, fitted_values};
+use crate::prediction::{InitialStates, signal_rms};
 use crate::progress::{Cancelled, Stage, Work};
 use crate::solve::Effort;
 
@@ -136,6 +138,26 @@ impl<'a> Refined<'a> {
         self.error = Some(now?);
         self.tried.extend(tried?);
         Ok(())
+    }
+
+    /// How fast and how far it moves: root mean squares of its signals; and what drives it.
+    pub(crate) fn moves(&mut self) -> Result<(Vec<f64>, Commands), FitError> {
+        let (model, silent): (&Model, _) = (self.model, self.work.silently());
+        let alike = match self.alike.take() {
+            Some(alike) => alike,
+            None => Alike::new(model, self.measurements, &silent)?,
+        };
+        let (values, runs) = (model.values(), &alike.runs);
+        let states = InitialStates::estimate(model, &values, runs, &silent)?.states;
+        let rms = signal_rms(model, &values, &states, runs, &silent)?;
+        let commands = Commands::of(model, runs);
+        self.alike = Some(alike);
+        Ok((rms, commands))
+    }
+
+    /// The error of the present model after a short fit, once it was computed.
+    pub(crate) fn error(&self) -> Option<f64> {
+        self.error
     }
 
     /// A model that was tried in place of the present one.

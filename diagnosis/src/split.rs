@@ -12,9 +12,11 @@ use crate::effect_at::EffectAt;
 use crate::error::FitError;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
+use crate::moves::Moves;
 use crate::progress::Work;
 use crate::refine::{free, instances, without_steps};
 use crate::refined::{Alike, Refined};
+use crate::suited::suit;
 
 /// Two effects in place of one: those of `first` and `second`, at its channels.
 struct Split {
@@ -32,10 +34,23 @@ pub(crate) fn split(
     let close = best.work.criteria().choice.close;
     let mut index = 0;
     while index < steps.len() {
-        let candidates = match steps[index].added.as_ref() {
+        let mut candidates = match steps[index].added.as_ref() {
             Some(place) => splits(best.model, place),
             None => Vec::new(),
         };
+        if !candidates.is_empty() {
+            let (rms, commands) = best.moves()?;
+            let sign_width = best.work.criteria().search.sign_width;
+            for (_, both) in &mut candidates {
+                suit(both, &rms, &commands, sign_width);
+                let moves = Moves::of_last(both, &rms, &commands);
+                let own = both.effects.last().map_or(0, |e| e.first_parameter);
+                for parameter in &mut both.parameters[own..] {
+                    let start = parameter.value.unwrap_or(0.0) + moves.first_step(parameter);
+                    parameter.value = Some(parameter.declaration.nearest(start));
+                }
+            }
+        }
         if let Some(Split { first, second }) = best.takes(candidates, |_| close)? {
             divide(best, steps, index, [first, second], diagnoses)?;
         }
@@ -44,7 +59,7 @@ pub(crate) fn split(
     Ok(())
 }
 
-/// What may stand in place of the effect at `place`, at rest until a fit moves it.
+/// What may stand in place of the effect at `place`, neutral.
 fn splits(model: &Model, place: &EffectAt) -> Vec<(Split, Model)> {
     let [instance] = instances(model, place)[..] else {
         return Vec::new();
@@ -62,13 +77,9 @@ fn splits(model: &Model, place: &EffectAt) -> Vec<(Split, Model)> {
             is_other && reads_no_more && second.states == 0 && !second.memory
         });
         for second in seconds {
-            let Some(mut both) = simpler.with_effect(second.id, &at) else {
+            let Some(both) = simpler.with_effect(second.id, &at) else {
                 continue;
             };
-            for parameter in &mut both.parameters[simpler.parameters.len()..] {
-                let start = parameter.value.unwrap_or(0.0) + parameter.scale();
-                parameter.value = Some(parameter.declaration.nearest(start));
-            }
             if free(&both) < free(model) {
                 let second = second.id;
                 found.push((Split { first, second }, both));

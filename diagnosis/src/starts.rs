@@ -166,10 +166,13 @@ fn starts(
             end.starts.map(nearest).to_vec()
         } else if !parameter.free && listed.is_empty() {
             vec![neutral]
-        } else if parameter.free && parameter.declaration.unit == "flow" && candidate.flow > 0.0 {
+        } else if parameter.free
+            && parameter.declaration.unit == "flow"
+            && candidate.moves.flow > 0.0
+        {
             FLOW_STARTS
                 .iter()
-                .map(|s| nearest(s * candidate.flow))
+                .map(|s| nearest(s * candidate.moves.flow))
                 .collect()
         } else if listed.is_empty() {
             // Where the position is measured, the linear parameters are found by regression.
@@ -177,16 +180,16 @@ fn starts(
             let step = if neutral_first {
                 0.0
             } else {
-                candidate.first_step(parameter)
+                candidate.moves.first_step(parameter)
             };
             vec![nearest(neutral + step)]
         } else {
             // What is counted per way or per speed depends on how far and how fast the machine goes.
             let unit = match parameter.declaration.unit {
-                "1/position" if candidate.reach > 0.0 => candidate.reach,
-                "1/flow" if candidate.flow > 0.0 => candidate.flow,
+                "1/position" if candidate.moves.reach > 0.0 => candidate.moves.reach,
+                "1/flow" if candidate.moves.flow > 0.0 => candidate.moves.flow,
                 // Ways on which something happens are those of so many seconds.
-                "position" if candidate.flow > 0.0 => 1.0 / candidate.flow,
+                "position" if candidate.moves.flow > 0.0 => 1.0 / candidate.moves.flow,
                 _ => 1.0,
             };
             listed.into_iter().map(|v| nearest(v / unit)).collect()

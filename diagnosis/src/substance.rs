@@ -35,7 +35,7 @@ pub(crate) fn does_something(
         .any(|p| {
             let away = p.value.zip(p.declaration.default);
             let shift = if p.is_time() { shift } else { 0.0 };
-            let enough = shift.max(least * candidate.first_step(p));
+            let enough = shift.max(least * candidate.moves.first_step(p));
             away.is_none_or(|(value, neutral)| (value - neutral).abs() > enough)
         })
 }
@@ -58,7 +58,7 @@ pub(crate) fn is_a_simpler_one(
     candidate.own().filter(vanishing).any(|i| {
         let is_way = candidate.model.parameters[i].declaration.unit == "position";
         let least = if is_way {
-            SHORTEST * period * candidate.flow
+            SHORTEST * period * candidate.moves.flow
         } else {
             0.0
         };

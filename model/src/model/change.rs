@@ -83,7 +83,7 @@ impl Model {
     }
 
     /// The model with its `index`-th effect replaced by the effect `id` at the channels `at`;
-    /// parameters of the same name keep their values.
+    /// parameters of the same name keep their values, and where they are from.
     pub fn with_effect_replaced(&self, index: usize, id: &str, at: &[&str]) -> Option<Model> {
         self.with_effect_changed(index, |model, old| {
             let first = model.parameters.len();
@@ -92,6 +92,7 @@ impl Model {
                 if let Some(from) = old.iter().find(|p| p.declaration.id == new.declaration.id) {
                     new.value = from.value;
                     new.free = from.free;
+                    new.origin = from.origin;
                 }
             }
             Some(model)

@@ -14,6 +14,8 @@ use loopsight_model::simulate::{Simulator, free_run};
 use loopsight_model::{Dual, derivative, variable};
 use loopsight_plants as _;
 
+mod sharp;
+
 const DDMR: &str = "[plant.ddmr]\nK_A = -15.146\nK_B = 0.005\nK_C = 0.136\nK_D = -9.573\n\
                     K_E = -3.945\nK_F = 0.656\nhalf_track = 0.131\nwheel_radius = 0.05\n";
 const AXIS: &str = "[plant.dc_axis]\nK_A = -4.0\nK_C = 3.0\n";
@@ -458,51 +460,4 @@ fn a_pushed_rate_is_a_slope() {
     simulator.push(Place::Rate(0), 0.0);
     simulator.advance(2.0, &[0.0]);
     assert!((simulator.state()[0] - 3.0).abs() < 1e-12);
-}
-
-/// A shaft that sticks is the fastest that a model knows. A step that is too long for it would make the derivatives grow
-/// without end. Friction may hold it in one direction only.
-#[test]
-fn derivatives_are_exact_where_friction_is_sharp() {
-    for (effect, sizes) in [
-        ("coulomb_friction", "level = 6.0"),
-        (
-            "directional_friction",
-            "level_forward = 6.0\nlevel_backward = 0.0",
-        ),
-        (
-            "directional_friction",
-            "level_backward = 6.0\nlevel_forward = 0.0",
-        ),
-    ] {
-        let text = format!(
-            "{AXIS}[log.measured]\nspeed = \"speed\"\n[[effect]]\n[effect.{effect}]\nat = [\"shaft\"]\n{sizes}\nwidth = 0.003\n"
-        );
-        let axis = model(&text);
-        let values = axis.values();
-        let level = format!("{effect}.{}", sizes.split(' ').next().unwrap());
-        let level = axis
-            .parameters
-            .iter()
-            .position(|p| p.name == level)
-            .unwrap();
-        let found = derivatives(&axis, &values, level);
-        let moved = |change: f64| {
-            let mut values = values.clone();
-            values[level] += change;
-            simulate(&axis, &values)
-        };
-        let change = 1e-5;
-        let (more, less) = (moved(change), moved(-change));
-        let by_difference: Vec<Vec<f64>> = (more.iter().zip(&less))
-            .map(|(a, b)| {
-                a.iter()
-                    .zip(b)
-                    .map(|(a, b)| (a - b) / (2.0 * change))
-                    .collect()
-            })
-            .collect();
-        let off = difference(&found, &by_difference);
-        assert!(off < 1e-3, "{effect}, {sizes}: off {off}");
-    }
 }
