@@ -119,9 +119,17 @@ impl Evidence<'_> {
                 && explanation.significance > criteria.certain
                 && !self.reshapes(judged))
             || self.shown_by_starts(judged, explanation);
-        better
-            && determined(&judged.candidate, explanation, criteria.undetermined)
-            && explanation.implausible.is_none()
+        let determined = determined(&judged.candidate, explanation, criteria.undetermined);
+        better && (determined || self.switches(judged)) && explanation.implausible.is_none()
+    }
+
+    /// Whether one parameter, of whatever size, takes nearly all of the error away. A current that acts from its own line of a log on, on a
+    /// voltage that is read with it, has a lead of any part of a period.
+    fn switches(&self, judged: &Judged) -> bool {
+        let candidate = &judged.candidate;
+        let own = candidate.own().map(|i| &candidate.model.parameters[i]);
+        let nearly_all = self.missing().most_left.powi(2) * self.error();
+        own.filter(|p| p.free).count() == 1 && nrmse(&judged.losses) <= nearly_all
     }
 
     /// Whether the effect depends on what went before, in a model where something is late already. In the few steps of a log

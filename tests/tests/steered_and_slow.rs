@@ -1,4 +1,4 @@
-//! A car whose understeer and gyro offset are missing, and a vessel whose sensor takes minutes.
+//! A car whose understeer and gyro offset are missing, a vessel whose sensor takes minutes, and a capacitor that is read with its current.
 
 #![allow(
     clippy::unwrap_used,
@@ -111,4 +111,40 @@ fn a_sensor_in_a_pocket_lags_by_a_minute_and_a_half() {
     let found = found["parameters"]["sensor_lag.lag"]["value"].as_f64();
     let found = found.unwrap();
     assert!((found / lag - 1.0).abs() < 0.05, "{found} s");
+}
+
+/// A capacitor whose voltage is read at once with its current, so that each line of the log has the voltage under its own current.
+///
+/// A lead of any part of a period does that. How long it is, nothing tells.
+#[test]
+fn a_voltage_is_read_with_its_current() {
+    let (capacity, inner, step) = (120.0, 0.02, 0.2);
+    let mut random = Random::new(89);
+    let (mut charge, mut current, mut until) = (1.5f64, 0.0, 0);
+    let mut log = "time_s,current_A,voltage_V\n".to_owned();
+    for k in 0..10_000 {
+        if k == until {
+            current = (600.0 * random.share() - 300.0 - 300.0 * (charge - 1.5)).round() / 100.0;
+            until = k + 5 * (10 + random.below(70));
+        }
+        if k % 5 == 0 {
+            let read = charge + inner * current + 0.002 * random.noise();
+            writeln!(log, "{},{current:.2},{read:.4}", k / 5).unwrap();
+        }
+        charge += step * (current - 0.05 * charge) / capacity;
+    }
+    let model = "[plant.expression.states]\n\
+         charge = { unit = \"V\", rate = \"(current - leak * charge + plate) / c\" }\n\
+         [plant.expression.outputs]\nvoltage = { unit = \"V\", value = \"charge + r * current\" }\n\
+         [plant.expression.inputs]\ncurrent = { unit = \"A\" }\n\
+         [plant.expression.channels]\nplate = { unit = \"A\", flow = \"charge\" }\n\
+         [plant.expression.parameters]\nc = { value = 100, unit = \"A s/V\" }\n\
+         r = { value = 0.03, unit = \"V/A\" }\nleak = { value = 0.04, unit = \"A/V\" }\n\
+         [log.inputs]\ncurrent = \"current_A\"\n[log.measured]\nvoltage = \"voltage_V\"\n";
+    let found = improved(model, &log);
+    let added = added(&found);
+    assert_eq!(added.len(), 1, "{added:?}");
+    assert_eq!(added[0].0, "input_lead");
+    assert!(added[0].1 < 0.006, "{added:?}");
+    assert!((found["parameters"]["c"]["value"].as_f64().unwrap() / capacity - 1.0).abs() < 0.01);
 }
