@@ -97,6 +97,11 @@ impl Evidence<'_> {
         nrmse(self.unseen)
     }
 
+    /// Whether a candidate leaves no more than this `share` of that.
+    fn leaves(&self, judged: &Judged, share: f64) -> bool {
+        nrmse(&judged.losses) <= share * self.error()
+    }
+
     fn above_floor(&self, error: f64) -> bool {
         error > self.missing().above_floor * self.floor
     }
@@ -128,8 +133,8 @@ impl Evidence<'_> {
     fn switches(&self, judged: &Judged) -> bool {
         let candidate = &judged.candidate;
         let own = candidate.own().map(|i| &candidate.model.parameters[i]);
-        let nearly_all = self.missing().most_left.powi(2) * self.error();
-        own.filter(|p| p.free).count() == 1 && nrmse(&judged.losses) <= nearly_all
+        let one = own.filter(|p| p.free).count() == 1;
+        one && self.leaves(judged, self.missing().most_left.powi(2))
     }
 
     /// Whether the effect depends on what went before, in a model where something is late already. In the few steps of a log
@@ -137,7 +142,7 @@ impl Evidence<'_> {
     /// in the rest of the log, steps are no evidence. Another shape does not take most of the error away, though.
     fn reshapes(&self, judged: &Judged) -> bool {
         let effects = self.nominal.model.effects.iter();
-        let rest = nrmse(&judged.losses) > self.missing().most_left * self.error();
+        let rest = !self.leaves(judged, self.missing().most_left);
         rest && judged.candidate.meta.is_dynamic() && effects.map(|e| e.meta).any(is_late)
     }
 
@@ -152,7 +157,7 @@ impl Evidence<'_> {
         !self.reshapes(judged)
             && self.nominal.holdout.test.is_none()
             && self.above_floor(self.error())
-            && nrmse(&judged.losses) <= criteria.no_worse * self.error()
+            && self.leaves(judged, criteria.no_worse)
             && explanation.significance > criteria.certain
             && explained
                 > (criteria.matters * self.nominal.floor)

@@ -103,10 +103,7 @@ impl<'a> Refined<'a> {
         self.changes += new.len() as u64;
         self.work.tell(Stage::Refining, self.changes, self.changes);
         let silent = self.work.silently();
-        let alike = match self.alike.take() {
-            Some(alike) => alike,
-            None => Alike::new(self.model, self.measurements, &silent)?,
-        };
+        let alike = self.take_alike(&silent)?;
         let refit = |model: &Model| -> Result<_, Cancelled> {
             match alike.refitted(model, &silent) {
                 Err(FitError::Cancelled(cancelled)) => Err(cancelled),
@@ -140,13 +137,19 @@ impl<'a> Refined<'a> {
         Ok(())
     }
 
+    /// What models are refitted to, to be put back. The present model says how where nothing was fitted yet.
+    fn take_alike(&mut self, work: &Work<'_>) -> Result<Alike<'a>, Cancelled> {
+        match self.alike.take() {
+            Some(alike) => Ok(alike),
+            None => Alike::new(self.model, self.measurements, work),
+        }
+    }
+
     /// How fast and how far it moves: root mean squares of its signals; and what drives it.
     pub(crate) fn moves(&mut self) -> Result<(Vec<f64>, Commands), FitError> {
-        let (model, silent): (&Model, _) = (self.model, self.work.silently());
-        let alike = match self.alike.take() {
-            Some(alike) => alike,
-            None => Alike::new(model, self.measurements, &silent)?,
-        };
+        let silent = self.work.silently();
+        let alike = self.take_alike(&silent)?;
+        let model: &Model = self.model;
         let (values, runs) = (model.values(), &alike.runs);
         let states = InitialStates::estimate(model, &values, runs, &silent)?.states;
         let rms = signal_rms(model, &values, &states, runs, &silent)?;

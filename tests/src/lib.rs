@@ -168,14 +168,15 @@ pub fn check_improved(found: &Value, effects: &[&str], values: &[(&str, f64)], w
     }
 }
 
-/// The error that the last step of `improve` left on data it did not see.
+/// Checks that the last step of `improve` left less than `most` on data it did not see.
 ///
 /// # Panics
 ///
-/// Where the answer lacks its keys.
-pub fn last_error(found: &Value) -> f64 {
+/// Where it did not, or the answer lacks its keys.
+pub fn check_left(found: &Value, most: f64) {
     let last = found["steps"].as_array().unwrap().last().unwrap();
-    last["nrmse_test"].as_f64().unwrap()
+    let left = last["nrmse_test"].as_f64().unwrap();
+    assert!(left < most, "{left}");
 }
 
 /// A page with the charts' data as they were before they were packed; the charts' library is left as it is.

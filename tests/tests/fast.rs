@@ -7,7 +7,7 @@
 
 use std::fmt::Write;
 
-use loopsight_tests::{Random, check_improved, last_error};
+use loopsight_tests::{Random, check_improved, check_left};
 use serde_json::Value;
 
 mod sessions;
@@ -17,8 +17,7 @@ use sessions::improved;
 /// Checks the effects that were added, in any order, that parameters of them are what they were made to 2 %, and that hardly anything is left.
 fn check(found: &Value, effects: &[&str], values: &[(&str, f64)], left: f64) {
     check_improved(found, effects, values, 0.02);
-    let last = last_error(found);
-    assert!(last < left, "{last}");
+    check_left(found, left);
 }
 
 /// A coil at a bridge, logged at 50 kHz for 0.2 s. Its command arrives two and a half samples late.
@@ -251,6 +250,5 @@ fn a_mirror_has_no_spring() {
         ],
         0.1,
     );
-    let last = last_error(&found);
-    assert!(last < 0.005, "{last}");
+    check_left(&found, 0.005);
 }

@@ -7,7 +7,7 @@
 
 use std::fmt::Write;
 
-use loopsight_tests::{Random, check_improved, last_error};
+use loopsight_tests::{Random, check_improved, check_left};
 
 mod sessions;
 
@@ -84,8 +84,7 @@ fn a_heat_sink_radiates_and_its_sensor_lags() {
         ("sensor_lag.lag", 9.0),
     ];
     check_improved(&found, &["quadratic_drag", "sensor_lag"], &values, 0.05);
-    let left = last_error(&found);
-    assert!(left < 0.005, "{left}");
+    check_left(&found, 0.005);
 }
 
 /// A robot that balances on two wheels, of which the wheels rub and the pitch is read 1.7° too large.
@@ -202,8 +201,7 @@ fn a_fan_is_dragged_and_has_a_dead_zone() {
         ],
         0.05,
     );
-    let last = last_error(&found);
-    assert!(last < 0.006, "{last}");
+    check_left(&found, 0.006);
 }
 
 /// The outlet of a heat exchanger: water takes 22 s to it, and its thermometer 14 s. The lag shows only after steps of the valve.
@@ -242,8 +240,7 @@ fn an_outlet_is_late_and_its_thermometer_lags() {
     let found_lag = either("actuator_lag.lag", "sensor_lag.lag").unwrap();
     assert!((found_delay / delay - 1.0).abs() < 0.1, "{found_delay}");
     assert!((found_lag / lag - 1.0).abs() < 0.2, "{found_lag}");
-    let last = last_error(&found);
-    assert!(last < 0.008, "{last}");
+    check_left(&found, 0.008);
 }
 
 /// A motor's currents along and across its field, at 5 kHz. Its bridge loses 0.8 V against the current of either, over 0.15 A.
@@ -301,6 +298,5 @@ fn a_bridge_loses_voltage_in_both_currents() {
         ],
         0.03,
     );
-    let last = last_error(&found);
-    assert!(last < 0.0045, "{last}");
+    check_left(&found, 0.0045);
 }

@@ -205,7 +205,7 @@ criteria! {
         complete: f64 = 1.2 "floors", Judgement: "the floor itself is an estimate";
         /// Least share of the standard deviation that it must explain.
         least_share: f64 = 0.004 "1", Judgement: "below it some effect of the library fits every imperfection of a sensor";
-        /// What leaves no more than this share of the error need not explain as much; what leaves its square need not be a part of the first error of an improvement.
+        /// What leaves no more than this share of the error need not explain as much, and is named beside something late; what leaves its square need not be a part of the first error of an improvement, nor have a size that the log determines.
         most_left: f64 = 0.5 "1", Judgement: "three quarters of the squared error are no coincidence";
         /// Standard error over the value beyond which the log does not determine a parameter.
         undetermined: f64 = 1.0 "1", Judgement: "not even its sign is known";

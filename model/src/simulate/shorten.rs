@@ -11,6 +11,7 @@ const WIDE: f64 = 1e9;
 /// Widths beyond which a speed is so far from rest that nothing sticks: a sign that is a hyperbolic tangent has a slope of 8e-9
 /// of that at rest there.
 const FAR: f64 = 10.0;
+
 impl<S: HostReal> Simulator<'_, S> {
     /// Makes the longest step so short that it is stable where dry friction holds the machine at rest, and lets none be longer
     /// than usual, or as long as the motion allows, that would not be stable.
