@@ -17,7 +17,8 @@ use loopsight_core::{Effect, EffectMeta, End, Parameter, PlaceKind, Reading, Rea
 /// | `g` | 9.80665 | m/s² |
 ///
 /// This is the law of a weir: the liquid stands a little above the edge, and the higher the more runs over it. A tank of
-/// 0.02 m² whose whole rim runs over has an `edge` of some 15 1/m, and of 0.1 l/s the last 2 mm show.
+/// 0.02 m² whose whole rim runs over has an `edge` of some 15 1/m, and of 0.1 l/s the last 2 mm show. The most that is taken, 1000 1/m, is the rim of a pipe of
+/// 4 mm: a fit that lacks something else makes the edge as sharp as it may, and has no derivatives beyond.
 ///
 /// Assumptions: what runs over is lost to the plant. Of two tanks one above the other a part may fall into the lower
 /// one: that is an effect of one's own there (`[effect.expression]` at `tank.lower`). The edge is level, and liquid over
@@ -61,13 +62,13 @@ impl Effect for Overflow {
                 "1/head",
                 "length of the edge over the area of the vessel",
             )
-            .within(0.0, f64::INFINITY)
+            .within(0.0, 1000.0)
             .or(0.0)
             .scaled(0.5),
         ],
         shows: Shows::AtEnd,
         rarity: 1,
-        max_step_s: 0.25,
+        max_step_s: 0.0025,
         ..EffectMeta::PLAIN
     };
 
