@@ -66,9 +66,10 @@ pub fn diagnose(
         discover: Discover::Never,
         force: true,
         unaided: Unaided::Sought,
+        leaves: f64::INFINITY,
     };
     let mut diagnosis = diagnose_for(model, measurements, aim, work)?;
-    match pair(&diagnosis, measurements, aim, work) {
+    match pair(&diagnosis, 0, measurements, aim, work) {
         Ok(Some(pair)) => diagnosis.lacks(&pair),
         Ok(None) => {}
         Err(Cancelled) => diagnosis.verdict = Conclusion::Cancelled,
@@ -86,6 +87,8 @@ pub(crate) struct Aim {
     pub(crate) force: bool,
     /// Whether it first looks for values with which the model needs no observer.
     pub(crate) unaided: Unaided,
+    /// The validation error below which an effect must come to be of use.
+    pub(crate) leaves: f64,
 }
 
 /// When an expression for the residual force is a candidate.
@@ -267,7 +270,9 @@ fn steps(
     diagnosis.where_it_fails = where_it_fails(&plain.model, &plain.solution, runs, work)?;
     let finalists = match aim.discover {
         Discover::Only => Vec::new(),
-        Discover::Never | Discover::Last => search(diagnosis, &nominal, read.parts_of_one(), work)?,
+        Discover::Never | Discover::Last => {
+            search(diagnosis, &nominal, read.parts_of_one(), aim, work)?
+        }
     };
     let Some(first) = read.first() else {
         let unseen = &plain.judgement.losses;
@@ -434,6 +439,7 @@ fn search(
     diagnosis: &mut Diagnosis,
     nominal: &Nominal<'_>,
     parts_of_one: bool,
+    aim: Aim,
     work: &Work<'_>,
 ) -> Result<Vec<Judged>, Cancelled> {
     let rms = rms(nominal, work)?;
@@ -460,6 +466,7 @@ fn search(
         work,
         extent: Extent::of(nominal.holdout.runs),
         shift: stamps::shift(nominal.holdout.runs),
+        leaves: aim.leaves / diagnosis.nominal.nrmse,
     };
     let Found { finalists, looked } = search.run();
     let (finalists, mut explanations): (Vec<Judged>, Vec<_>) = finalists.into_iter().unzip();

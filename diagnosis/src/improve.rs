@@ -79,21 +79,19 @@ fn improve_with(
             },
         };
         let round = state.diagnoses.len();
-        // Beside an effect that was found, a further one is judged alone.
-        if round == 0 {
-            match pair(&diagnosis, measurements, state.aim(work), &work.in_round(1)) {
-                Ok(None) => {}
-                Ok(Some(pair)) => {
-                    diagnosis.lacks(&pair);
-                    state.diagnoses.push(diagnosis);
-                    state.step(pair.first, round, work);
-                    known = Some(pair.second);
-                    continue;
-                }
-                Err(Cancelled) => {
-                    state.diagnoses.push(diagnosis);
-                    break Conclusion::Cancelled;
-                }
+        let beside = work.in_round(round + 1);
+        match pair(&diagnosis, round, measurements, state.aim(work), &beside) {
+            Ok(None) => {}
+            Ok(Some(pair)) => {
+                diagnosis.lacks(&pair);
+                state.diagnoses.push(diagnosis);
+                state.step(pair.first, round, work);
+                known = Some(pair.second);
+                continue;
+            }
+            Err(Cancelled) => {
+                state.diagnoses.push(diagnosis);
+                break Conclusion::Cancelled;
             }
         }
         let next = worth_adding(&diagnosis, round, work.criteria());
@@ -163,6 +161,7 @@ impl State {
             discover: self.discover,
             force: true,
             unaided: self.unaided(),
+            leaves: f64::INFINITY,
         }
     }
 

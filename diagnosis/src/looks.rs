@@ -158,13 +158,17 @@ impl Search<'_> {
         promise.left.is_some_and(explains_less)
     }
 
-    /// Where the plain model leaves hardly more than noise, what anything that is worth trying may leave of its cost: it
-    /// explains its share of the part of that noise that an effect must explain to matter.
+    /// What anything that is worth trying may leave of the plain model's cost, where that is known: it explains its share of what
+    /// it must explain. That is said by what the search is for, and where the plain model leaves hardly more than noise it
+    /// is the part of that noise that an effect must explain to matter.
     pub(crate) fn worth_trying(&self) -> Option<f64> {
         let missing = &self.work.criteria().missing;
         let floors = nrmse(self.nominal.rank) / self.nominal.floor;
         let matters = (missing.matters / floors).powi(2);
-        (floors <= missing.complete).then(|| self.beside(1.0, 1.0 - matters))
+        let at_floor = (floors <= missing.complete).then_some(1.0 - matters);
+        let asked = (self.leaves < 1.0).then(|| self.leaves.powi(2));
+        let least = at_floor.into_iter().chain(asked).reduce(f64::min)?;
+        Some(self.beside(1.0, least))
     }
 
     /// Whether a promised `cost` tells anything.

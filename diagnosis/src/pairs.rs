@@ -23,11 +23,12 @@ pub(crate) struct Pair {
 /// Where no effect of the library explains what the model does not, or the one that is named stands in for another: the two
 /// that do it best together, if any do.
 ///
-/// The best of the `diagnosis` are taken for granted one after the other, and each model with one of them is diagnosed
+/// The best of the `diagnosis` of a `round` are taken for granted one after the other, and each model with one of them is diagnosed
 /// again. The second effect is then judged as any other, and both together must lower the validation error by enough
 /// to matter.
 pub(crate) fn pair(
     diagnosis: &Diagnosis,
+    round: usize,
     measurements: &Measurements<'_>,
     aim: Aim,
     work: &Work<'_>,
@@ -41,10 +42,11 @@ pub(crate) fn pair(
         discover: Discover::Never,
         force: false,
         unaided: aim.unaided.after(diagnosis.observer.as_ref()),
+        leaves: most(diagnosis, round, criteria),
         ..aim
     };
     let mut best: Option<(f64, Pair)> = None;
-    for first in firsts(diagnosis, criteria) {
+    for first in firsts(diagnosis, round, criteria) {
         let second = match diagnose_for(&first.model, measurements, aim, work) {
             Err(FitError::Cancelled(cancelled)) => return Err(cancelled),
             // The model with it alone leads nowhere.
@@ -63,8 +65,19 @@ pub(crate) fn pair(
     Ok(best.map(|(_, pair)| pair))
 }
 
+/// The validation error that both together may leave. Beside effects that were found before, some two fit any log better, so they
+/// must leave no more than noise.
+fn most(diagnosis: &Diagnosis, round: usize, criteria: &Criteria) -> f64 {
+    let most = criteria.improve.better * diagnosis.nominal.nrmse;
+    if round == 0 {
+        most
+    } else {
+        most.min(criteria.missing.above_floor * diagnosis.floor.nrmse)
+    }
+}
+
 /// The explanations of a diagnosis to begin with: the best that do something, each another response of the machine.
-fn firsts<'d>(diagnosis: &'d Diagnosis, criteria: &Criteria) -> Vec<&'d Explanation> {
+fn firsts<'d>(diagnosis: &'d Diagnosis, round: usize, criteria: &Criteria) -> Vec<&'d Explanation> {
     let close = criteria.choice.close;
     let near = |a: f64, b: f64| a <= close * b && b <= close * a;
     let same = |a: &Explanation, b: &Explanation| {
@@ -79,7 +92,11 @@ fn firsts<'d>(diagnosis: &'d Diagnosis, criteria: &Criteria) -> Vec<&'d Explanat
             firsts.push(explanation);
         }
     }
-    firsts.truncate(criteria.pairs.firsts);
+    firsts.truncate(if round == 0 {
+        criteria.pairs.firsts
+    } else {
+        criteria.pairs.later
+    });
     firsts
 }
 
@@ -100,7 +117,7 @@ fn left_by(
         > (criteria.missing.matters * floor)
             .max(criteria.missing.least_share)
             .max(aim.worth);
-    (alike && matters && left < criteria.improve.better * before).then_some(left)
+    (alike && matters && left < aim.leaves).then_some(left)
 }
 
 impl Diagnosis {

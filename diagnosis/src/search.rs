@@ -26,6 +26,8 @@ pub(crate) struct Search<'a> {
     pub(crate) extent: Extent,
     /// How late time stamps may be of their own, s.
     pub(crate) shift: f64,
+    /// Share of the plain model's error below which a candidate must come.
+    pub(crate) leaves: f64,
 }
 
 /// What a search found.
@@ -343,6 +345,7 @@ mod tests {
             work: &work,
             extent: Extent::of(&runs),
             shift: 0.0,
+            leaves: f64::INFINITY,
         })
     }
 

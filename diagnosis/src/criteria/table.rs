@@ -223,6 +223,8 @@ criteria! {
     pairs: PairCriteria {
         /// Most effects that are taken for granted, one after the other.
         firsts: usize = 2 "1", Judgement: "each costs as much as the diagnosis";
+        /// The same, beside effects that an improvement added.
+        later: usize = 1 "1", Judgement: "most of the error is explained by then";
         /// How far the parameters of such an effect must be from no influence.
         significant: f64 = 2.0 "standard errors", Convention: "95 %; the second effect must then be as sure as any";
     }
