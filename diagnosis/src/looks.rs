@@ -142,7 +142,7 @@ impl Search<'_> {
     }
 
     /// Whether a candidate with a `promise` has nothing to do with what is missing: the best of those `looked` at
-    /// explains the log, and of what that one explains it promises to explain next to nothing; or nothing is missing. One
+    /// explains the log, and of what that one explains it promises to explain next to nothing; or it is not worth trying. One
     /// that promises to do worse than the plain model starts too far from it to tell.
     fn is_beside(&self, promise: Promise, looked: &Looked) -> bool {
         let of_best = self.tells(promise.cost)
@@ -152,7 +152,7 @@ impl Search<'_> {
         of_best || shown && self.is_needless(promise)
     }
 
-    /// Whether nothing is missing, and a `promise` gives no reason to think otherwise.
+    /// Whether it is known what is worth trying, and a `promise` is not.
     fn is_needless(&self, promise: Promise) -> bool {
         let explains_less = |left| self.worth_trying().is_some_and(|most| left > most);
         promise.left.is_some_and(explains_less)
@@ -220,8 +220,8 @@ impl Search<'_> {
             starts.partition(|(i, _)| !(0..self.all.len()).any(|j| self.is_part(*i, j)));
         let (done, of) = (AtomicU64::new(0), (whole.len() + parts.len()) as u64);
         self.work.tell(Stage::Promises, 0, of);
-        let at_floor = self.worth_trying().is_some();
-        let promises = Promises::new(self.nominal, at_floor);
+        let asked = self.worth_trying().is_some();
+        let promises = Promises::new(self.nominal, asked);
         let promised = |attempts: Vec<Attempt>| -> Vec<Promising> {
             let each = attempts.into_par_iter().filter_map(|(i, start)| {
                 let promise = promises.of(&self.all[i].chosen(&start), &start);
@@ -243,7 +243,7 @@ impl Search<'_> {
             same.or_else(best).map(|(promise, _)| *promise)
         };
         let explained = |(best, error)| self.is_explained(error) && self.acts_on_both_sides(best);
-        let nothing = at_floor
+        let nothing = asked
             && all
                 .iter()
                 .all(|(p, _)| p.left.is_none() || self.is_needless(*p));

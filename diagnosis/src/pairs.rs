@@ -34,19 +34,23 @@ pub(crate) fn pair(
     work: &Work<'_>,
 ) -> Result<Option<Pair>, Cancelled> {
     let criteria = work.criteria();
-    if diagnosis.verdict != Conclusion::UnknownEffect && !names_a_stand_in(diagnosis, criteria) {
+    let open =
+        diagnosis.verdict == Conclusion::UnknownEffect || names_a_stand_in(diagnosis, criteria);
+    // The second one is named in the next round.
+    if !open || round + 1 >= criteria.improve.most {
         return Ok(None);
     }
+    let (many, leaves) = allowed(diagnosis, round, criteria);
     // Of a second effect that is not found, nothing is said.
     let aim = Aim {
         discover: Discover::Never,
         force: false,
         unaided: aim.unaided.after(diagnosis.observer.as_ref()),
-        leaves: most(diagnosis, round, criteria),
+        leaves,
         ..aim
     };
     let mut best: Option<(f64, Pair)> = None;
-    for first in firsts(diagnosis, round, criteria) {
+    for first in firsts(diagnosis, many, criteria) {
         let second = match diagnose_for(&first.model, measurements, aim, work) {
             Err(FitError::Cancelled(cancelled)) => return Err(cancelled),
             // The model with it alone leads nowhere.
@@ -65,19 +69,19 @@ pub(crate) fn pair(
     Ok(best.map(|(_, pair)| pair))
 }
 
-/// The validation error that both together may leave. Beside effects that were found before, some two fit any log better, so they
-/// must leave no more than noise.
-fn most(diagnosis: &Diagnosis, round: usize, criteria: &Criteria) -> f64 {
-    let most = criteria.improve.better * diagnosis.nominal.nrmse;
+/// How many effects are taken for granted, and the validation error that both together may leave. Beside effects that were found
+/// before, some two fit any log better, so they must leave hardly more than noise.
+fn allowed(diagnosis: &Diagnosis, round: usize, criteria: &Criteria) -> (usize, f64) {
+    let better = criteria.improve.better * diagnosis.nominal.nrmse;
     if round == 0 {
-        most
-    } else {
-        most.min(criteria.missing.above_floor * diagnosis.floor.nrmse)
+        return (criteria.pairs.firsts, better);
     }
+    let noise = criteria.missing.above_floor * diagnosis.floor.nrmse;
+    (criteria.pairs.later, better.min(noise))
 }
 
-/// The explanations of a diagnosis to begin with: the best that do something, each another response of the machine.
-fn firsts<'d>(diagnosis: &'d Diagnosis, round: usize, criteria: &Criteria) -> Vec<&'d Explanation> {
+/// The explanations of a diagnosis to begin with: so many of the best that do something, each another response of the machine.
+fn firsts<'d>(diagnosis: &'d Diagnosis, many: usize, criteria: &Criteria) -> Vec<&'d Explanation> {
     let close = criteria.choice.close;
     let near = |a: f64, b: f64| a <= close * b && b <= close * a;
     let same = |a: &Explanation, b: &Explanation| {
@@ -92,11 +96,7 @@ fn firsts<'d>(diagnosis: &'d Diagnosis, round: usize, criteria: &Criteria) -> Ve
             firsts.push(explanation);
         }
     }
-    firsts.truncate(if round == 0 {
-        criteria.pairs.firsts
-    } else {
-        criteria.pairs.later
-    });
+    firsts.truncate(many);
     firsts
 }
 

@@ -16,6 +16,7 @@ use loopsight_hidden::{Hidden, Recording, Robot, record_along};
 use loopsight_model::model::Model;
 use loopsight_model::simulate::{Simulator, free_run};
 use loopsight_plants as _;
+use loopsight_tests::WINDINGS;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -25,8 +26,6 @@ const SAMPLES: usize = 4001;
 const HELD: usize = 50;
 /// The voltage, V.
 const VOLTS: f64 = 9.0;
-/// Time constant of the windings, s.
-const WINDINGS: f64 = 1e-4;
 /// Free runs whose middle is the measure.
 const RUNS: usize = 201;
 

@@ -16,11 +16,8 @@ use loopsight_diagnosis::{ImproveSettings, Improvement, Measurements, Work, impr
 use loopsight_hidden::{Experiment, Hidden, Recording, Robot, catalogue, record_with};
 use loopsight_model::model::Model;
 use loopsight_plants as _;
-use loopsight_tests::Random;
+use loopsight_tests::{Random, WINDINGS};
 use rayon::prelude::*;
-
-/// Windings of a motor with an ironless rotor, s.
-const WINDINGS: f64 = 1e-4;
 
 const PAIRS: [(Hidden, Hidden); 12] = [
     (Hidden::CoulombFriction, Hidden::InputDelay),
@@ -69,11 +66,17 @@ fn main() {
 }
 
 /// A log to learn from and a multi-level one that nothing is fitted to.
-fn logs(hidden: &[(Hidden, f64)], kind: Experiment, seed: u64) -> Option<(Recording, Recording)> {
-    let robot = hidden.first()?.0.home();
-    let log = record_with(robot, hidden, kind, seed, WINDINGS).ok()?;
-    let unseen = record_with(robot, hidden, Experiment::MultiLevel, 500 + seed, WINDINGS).ok()?;
-    Some((log, unseen))
+fn logs(
+    robot: Robot,
+    hidden: &[(Hidden, f64)],
+    kind: Experiment,
+    seed: u64,
+) -> Option<(Recording, Recording)> {
+    let recorded = |kind, seed| record_with(robot, hidden, kind, seed, WINDINGS).ok();
+    Some((
+        recorded(kind, seed)?,
+        recorded(Experiment::MultiLevel, 500 + seed)?,
+    ))
 }
 
 /// Improves on `log` alone; the error of the best model on `unseen`, and its floor.
@@ -129,9 +132,12 @@ fn small() {
     let found: Vec<bool> = (1..=10u64)
         .into_par_iter()
         .map(|seed| {
-            let Some((log, unseen)) =
-                logs(&[(Hidden::CoulombFriction, 0.3)], Experiment::Prbs, seed)
-            else {
+            let Some((log, unseen)) = logs(
+                Robot::Twil,
+                &[(Hidden::CoulombFriction, 0.3)],
+                Experiment::Prbs,
+                seed,
+            ) else {
                 return false;
             };
             let Some((found, error, floor)) = improved(&log, &unseen) else {
@@ -162,7 +168,8 @@ fn pairs() {
     let named: Vec<bool> = PAIRS
         .par_iter()
         .map(|(a, b)| {
-            let Some((log, unseen)) = logs(&[(*a, 1.0), (*b, 1.0)], Experiment::Mixed, 7) else {
+            let Some((log, unseen)) = logs(a.home(), &[(*a, 1.0), (*b, 1.0)], Experiment::Mixed, 7)
+            else {
                 return false;
             };
             let Some((found, error, floor)) = improved(&log, &unseen) else {
@@ -208,9 +215,7 @@ fn several(count: u64, seeds: std::ops::Range<u64>, robot: Option<&str>) {
             let drawn = Robot::ALL[random.below(Robot::ALL.len())];
             let robot = named.copied().unwrap_or(drawn);
             let chosen = drawn_for(robot, count, &mut random);
-            let recorded = |kind, seed| record_with(robot, &chosen, kind, seed, WINDINGS).ok();
-            let log = recorded(Experiment::Mixed, seed)?;
-            let unseen = recorded(Experiment::MultiLevel, 500 + seed)?;
+            let (log, unseen) = logs(robot, &chosen, Experiment::Mixed, seed)?;
             let truth: Vec<String> = (chosen.iter())
                 .map(|(effect, size)| format!("{}={size}", effect.id()))
                 .collect();
@@ -242,12 +247,12 @@ fn several(count: u64, seeds: std::ops::Range<u64>, robot: Option<&str>) {
 fn drawn_for(robot: Robot, count: u64, random: &mut Random) -> Vec<(Hidden, f64)> {
     let of_robot = catalogue().into_iter().filter(|(of, _)| *of == robot);
     let mut rest: Vec<Hidden> = of_robot.map(|(_, effect)| effect).collect();
-    let mut drawn = Vec::new();
-    while (drawn.len() as u64) < count && !rest.is_empty() {
+    let most = count.min(rest.len() as u64);
+    let draw = |_| {
         let effect = rest.swap_remove(random.below(rest.len()));
-        drawn.push((effect, [0.5, 1.0, 2.0][random.below(3)]));
-    }
-    drawn
+        (effect, [0.5, 1.0, 2.0][random.below(3)])
+    };
+    (0..most).map(draw).collect()
 }
 
 /// What an improved model may leave over the floor.
@@ -256,7 +261,7 @@ const WITHIN: f64 = 1.05;
 fn floor(effects: &[Hidden]) {
     println!("improved model on unseen multi-level input over the floor");
     let ratio = |effect: Hidden, kind: Experiment| {
-        let (log, unseen) = logs(&[(effect, 1.0)], kind, 3)?;
+        let (log, unseen) = logs(effect.home(), &[(effect, 1.0)], kind, 3)?;
         let (found, error, floor) = improved(&log, &unseen)?;
         println!(
             "  {:22} {:6} {:.3}  ({:.2} % / {:.2} %)  {}",

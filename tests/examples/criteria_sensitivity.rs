@@ -13,7 +13,7 @@ use clap::Parser;
 use loopsight_diagnosis::{Criteria, Criterion, Reason};
 use loopsight_hidden::{Experiment, Robot, catalogue};
 use loopsight_plants as _;
-use loopsight_tests::Random;
+use loopsight_tests::{Random, WINDINGS};
 use rayon::prelude::*;
 
 #[path = "blind/mod.rs"]
@@ -40,9 +40,6 @@ struct Arguments {
     #[arg(long)]
     write: Option<PathBuf>,
 }
-
-/// Windings of a motor with an ironless rotor, s.
-const WINDINGS: f64 = 1e-4;
 
 /// How far each criterion is moved.
 const FACTORS: [f64; 2] = [1.2, 0.8];

@@ -16,6 +16,7 @@ use loopsight_model::excitation::Excitation;
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
 use loopsight_plants as _;
+use loopsight_tests::WINDINGS;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -28,9 +29,6 @@ use rayon::prelude::*;
 mod blind;
 
 use blind::Case;
-
-/// Windings of a motor with an ironless rotor, s.
-const WINDINGS: f64 = 1e-4;
 
 /// What a diagnosis finds in recordings that were made as in the field
 #[derive(Parser)]

@@ -29,6 +29,9 @@ use loopsight_model::sensor::Sensor;
 use loopsight_plants as _;
 use serde_json::Value;
 
+/// Windings of a motor with an ironless rotor, s. No model knows of them, and they are too quick to be seen.
+pub const WINDINGS: f64 = 1e-4;
+
 /// The top folder of the repository.
 pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -11,10 +11,7 @@ use loopsight_diagnosis::{
 use loopsight_hidden::{Experiment, Hidden, Recording, record_with};
 use loopsight_model::model::Model;
 use loopsight_plants as _;
-use loopsight_tests::repository;
-
-/// Windings of a motor with an ironless rotor, s.
-const WINDINGS: f64 = 1e-4;
+use loopsight_tests::{WINDINGS, repository};
 
 /// What a piece of `work` with a recording of `hidden` simulates is no more than the table says of `name`.
 fn no_more(name: &str, hidden: &[Hidden], work: impl FnOnce(&Model, &Measurements<'_>, &Work<'_>)) {

@@ -12,10 +12,7 @@ use loopsight_diagnosis::{Conclusion, Diagnosis, Measurements, Work, diagnose};
 use loopsight_hidden::{Experiment, Hidden, Recording, Robot, record_with};
 use loopsight_model::model::Model;
 use loopsight_plants as _;
-use loopsight_tests::real_data;
-
-/// Windings of a motor with an ironless rotor, s.
-const WINDINGS: f64 = 1e-4;
+use loopsight_tests::{WINDINGS, real_data};
 
 fn log(hidden: &[(Hidden, f64)], kind: Experiment, seed: u64) -> Recording {
     let robot = hidden.first().map_or(Robot::Twil, |h| h.0.home());

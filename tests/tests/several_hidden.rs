@@ -9,9 +9,7 @@ use loopsight_diagnosis::{ImproveSettings, Measurements, Work, compare, improve}
 use loopsight_hidden::{Experiment, Hidden, Robot, record_with};
 use loopsight_model::model::Model;
 use loopsight_plants as _;
-
-/// Windings of a motor with an ironless rotor, s.
-const WINDINGS: f64 = 1e-4;
+use loopsight_tests::WINDINGS;
 
 /// Checks that `improve` finds the `effects` from one recording, and that the model then leaves of another one what noise and
 /// resolution leave, but for a tenth.

@@ -7,7 +7,7 @@
 
 use std::fmt::Write;
 
-use loopsight_tests::Random;
+use loopsight_tests::{Random, check_improved, check_left};
 use serde_json::Value;
 
 mod sessions;
@@ -142,9 +142,6 @@ fn a_voltage_is_read_with_its_current() {
          r = { value = 0.03, unit = \"V/A\" }\nleak = { value = 0.04, unit = \"A/V\" }\n\
          [log.inputs]\ncurrent = \"current_A\"\n[log.measured]\nvoltage = \"voltage_V\"\n";
     let found = improved(model, &log);
-    let added = added(&found);
-    assert_eq!(added.len(), 1, "{added:?}");
-    assert_eq!(added[0].0, "input_lead");
-    assert!(added[0].1 < 0.006, "{added:?}");
-    assert!((found["parameters"]["c"]["value"].as_f64().unwrap() / capacity - 1.0).abs() < 0.01);
+    check_improved(&found, &["input_lead"], &[("c", capacity)], 0.01);
+    check_left(&found, 0.006);
 }

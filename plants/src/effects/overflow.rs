@@ -17,8 +17,10 @@ use loopsight_core::{Effect, EffectMeta, End, Parameter, PlaceKind, Reading, Rea
 /// | `g` | 9.80665 | m/s² |
 ///
 /// This is the law of a weir: the liquid stands a little above the edge, and the higher the more runs over it. A tank of
-/// 0.02 m² whose whole rim runs over has an `edge` of some 15 1/m, and of 0.1 l/s the last 2 mm show. The most that is taken, 1000 1/m, is the rim of a pipe of
-/// 4 mm: a fit that lacks something else makes the edge as sharp as it may, and has no derivatives beyond.
+/// 0.02 m² whose whole rim runs over has an `edge` of some 15 1/m, and of 0.1 l/s the last 2 mm show.
+///
+/// The most that is taken, 1000 1/m, is the rim of a pipe of 4 mm. A fit of a model that lacks something else makes the edge
+/// as sharp as it may, and beyond that its derivatives have no end.
 ///
 /// Assumptions: what runs over is lost to the plant. Of two tanks one above the other a part may fall into the lower
 /// one: that is an effect of one's own there (`[effect.expression]` at `tank.lower`). The edge is level, and liquid over
