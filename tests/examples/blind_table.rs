@@ -13,6 +13,7 @@ use clap::Parser;
 use loopsight_diagnosis::Criteria;
 use loopsight_hidden::{Experiment, Robot, catalogue};
 use loopsight_plants as _;
+use loopsight_tests::WINDINGS;
 use rayon::prelude::*;
 
 #[path = "blind/mod.rs"]
@@ -42,7 +43,7 @@ struct Arguments {
     #[arg(long, value_delimiter = ',')]
     only: Vec<String>,
     /// Time constant of the motors' windings, s: those of an ironless rotor
-    #[arg(long, default_value_t = 1e-4)]
+    #[arg(long, default_value_t = WINDINGS)]
     windings: f64,
     /// Write the table here
     #[arg(long)]

@@ -16,7 +16,7 @@ use loopsight_drivers::{Simulated, simulate_inputs};
 use loopsight_hidden::{Hidden, Robot, record_along};
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
-use loopsight_tests::{PERIOD, recording, twil, twil_path};
+use loopsight_tests::{PERIOD, WINDINGS, recording, twil, twil_path};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -69,7 +69,7 @@ fn asked(run: Run) -> Diagnosis {
 fn hidden_machine(effect: Hidden, size: f64, plan: &Plan, seed: u64) -> (Model, Run) {
     let inputs = plan.drive.inputs.chunks_exact(2);
     let commands: Vec<[f64; 2]> = inputs.map(|u| [u[0], u[1]]).collect();
-    let log = record_along(Robot::Twil, &[(effect, size)], &commands, seed, 1e-4).unwrap();
+    let log = record_along(Robot::Twil, &[(effect, size)], &commands, seed, WINDINGS).unwrap();
     (
         Model::from_toml("hidden", &log.model_toml).unwrap().0,
         log.run,
