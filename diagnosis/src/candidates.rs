@@ -195,14 +195,14 @@ impl Candidate {
         Some(without)
     }
 
-    /// `start` with a hundredth of the sizes of the effect: its linear parameters and times that are zero without it. None where
+    /// `start` with a hundredth of the sizes of the effect: its linear parameters that are zero without it, and its `times`. None where
     /// it has none, or they are nothing already. A lag of 20 ms is another machine where a swing takes 70 ms.
-    pub(crate) fn faint(&self, start: &[f64]) -> Option<Vec<f64>> {
+    pub(crate) fn faint(&self, start: &[f64], times: bool) -> Option<Vec<f64>> {
         let mut faint = start.to_vec();
         for i in self.own() {
             let parameter = &self.model.parameters[i];
             let declaration = parameter.declaration;
-            let is_size = declaration.linear || parameter.is_time();
+            let is_size = declaration.linear || (times && parameter.is_time());
             if parameter.free && is_size && declaration.default == Some(0.0) {
                 faint[i] *= 0.01;
             }

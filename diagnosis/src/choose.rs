@@ -18,6 +18,8 @@ const RARE: u8 = 4;
 pub(crate) struct Chosen {
     /// Its index among the finalists.
     pub(crate) finalist: usize,
+    /// The best one, where it does better by more than chance, but is not as simple.
+    pub(crate) set_aside: Option<(usize, Explanation)>,
 }
 
 /// Puts the simplest explanation first that is not significantly worse than the best one, and lists those that
@@ -124,7 +126,13 @@ pub(crate) fn choose(
         .map(|i| explanations[i].place.clone())
         .collect();
     explanations[chosen].indistinguishable_from = class;
+    let best = firsts().next();
+    let set_aside = best.filter(|best| !same(chosen, *best) && !simpler(chosen));
+    let set_aside = set_aside.map(|best| (best, explanations[best].clone()));
     let first = explanations.remove(chosen);
     explanations.insert(0, first);
-    Some(Chosen { finalist: chosen })
+    Some(Chosen {
+        finalist: chosen,
+        set_aside,
+    })
 }

@@ -40,12 +40,15 @@ pub(crate) fn conclude(
     let criteria = evidence.criteria();
     let chosen = choose(explanations, finalists, evidence.floor, &earned, criteria);
     let leader = chosen.as_ref().map(|chosen| &finalists[chosen.finalist]);
-    diagnosis.missing = chosen.and_then(|chosen| {
+    diagnosis.missing = chosen.as_ref().and_then(|chosen| {
         let best = explanations.first()?;
         evidence
             .is_missing(&finalists[chosen.finalist], best)
             .then(|| best.place.clone())
     });
+    let set_aside = chosen.and_then(|chosen| chosen.set_aside);
+    let set_aside = set_aside.filter(|(i, best)| evidence.is_missing(&finalists[*i], best));
+    diagnosis.set_aside = set_aside.map(|(_, best)| best);
     let believed = leader.filter(|_| diagnosis.missing.is_some());
     if evidence.not_fitted(believed) {
         diagnosis.missing = None;

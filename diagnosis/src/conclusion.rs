@@ -77,6 +77,31 @@ pub struct Explanation {
     pub nrmse_fit: f64,
 }
 
+#[cfg(test)]
+impl Explanation {
+    /// A significant one by this effect at the shaft of an axis, with the error that it leaves.
+    pub(crate) fn at_shaft(effect: &str, nrmse: f64) -> Self {
+        let text = "[plant.dc_axis]\nK_A = -2.0\nK_C = 8.0\n[log.measured.speed]\n";
+        let (model, _) = Model::from_toml("axis.toml", text).unwrap();
+        Self {
+            place: EffectAt {
+                effect: effect.to_owned(),
+                at: vec!["shaft".to_owned()],
+            },
+            together_with: None,
+            nrmse,
+            parameters: BTreeMap::new(),
+            significance: 9.0,
+            indistinguishable_from: Vec::new(),
+            note: String::new(),
+            implausible: None,
+            model: model.with_effect(effect, &["shaft"]).unwrap(),
+            entries: None,
+            nrmse_fit: nrmse,
+        }
+    }
+}
+
 impl From<&Explanation> for Fitted {
     fn from(found: &Explanation) -> Self {
         Self {
@@ -129,4 +154,21 @@ pub struct Diagnosis {
     /// Its error on what it was fitted to.
     #[serde(skip)]
     pub nominal_fit: f64,
+    /// What does better than the missing effect, and was set aside because that is simpler.
+    #[serde(skip)]
+    pub set_aside: Option<Explanation>,
+}
+
+impl Diagnosis {
+    /// What it says of the effect at a place.
+    pub(crate) fn explanation(&self, place: &EffectAt) -> Option<&Explanation> {
+        self.candidates.iter().find(|c| c.place == *place)
+    }
+
+    /// Names `best` as missing, before all others.
+    pub(crate) fn name(&mut self, best: Explanation) {
+        self.missing = Some(best.place.clone());
+        self.candidates.retain(|other| other.place != best.place);
+        self.candidates.insert(0, best);
+    }
 }

@@ -181,7 +181,7 @@ fn with_widths_of(model: &Model, fitted: &Model) -> Model {
 
 impl Diagnosis {
     /// A diagnosis that has found nothing yet.
-    fn begun(faults: &[Fault]) -> Self {
+    pub(crate) fn begun(faults: &[Fault]) -> Self {
         Self {
             nominal: Level { nrmse: f64::NAN },
             floor: Level { nrmse: f64::NAN },
@@ -196,6 +196,7 @@ impl Diagnosis {
             observer: None,
             model: None,
             nominal_fit: f64::NAN,
+            set_aside: None,
         }
     }
 

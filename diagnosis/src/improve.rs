@@ -18,6 +18,7 @@ use crate::refine::{
     blurs, estimated, has_the_effects_of, is_mostly_open, is_undetermined, refine, still_open,
     without_step,
 };
+use crate::set_aside::set_aside;
 use crate::settings::{FitSettings, ImproveSettings, Method};
 use crate::split::second_anew;
 use crate::worth::worth_adding;
@@ -96,9 +97,15 @@ fn improve_with(
         }
         let next = worth_adding(&diagnosis, round, work.criteria());
         state.diagnoses.push(diagnosis);
-        let best = match next {
-            Ok(best) => best,
-            Err(verdict) => break verdict,
+        let (best, round) = match next {
+            Ok(best) => (best, round),
+            Err(verdict) => match state.set_aside(verdict, measurements, work) {
+                Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
+                better => match better? {
+                    Some(better) => better,
+                    None => break verdict,
+                },
+            },
         };
         match state.add(best, round, measurements, work) {
             Err(FitError::Cancelled(Cancelled)) => break Conclusion::Cancelled,
@@ -130,6 +137,8 @@ struct State {
     tried: Vec<(f64, Model)>,
     /// The present model fitted to all of the log, where that was done beside its diagnosis.
     fitted: Option<Fit>,
+    /// The same, and no last step is to go.
+    settled: Option<Fit>,
 }
 
 impl State {
@@ -143,6 +152,7 @@ impl State {
             corrected: false,
             tried: Vec::new(),
             fitted: None,
+            settled: None,
         }
     }
 
@@ -309,9 +319,12 @@ impl State {
     fn settled(
         &mut self,
         measurements: &Measurements<'_>,
-        settings: &FitSettings,
         work: &Work<'_>,
     ) -> Result<Fit, FitError> {
+        if let Some(settled) = self.settled.take() {
+            return Ok(settled);
+        }
+        let settings = &FitSettings::default();
         let Criteria {
             improve, missing, ..
         } = work.criteria();
@@ -353,6 +366,30 @@ impl State {
         }
     }
 
+    /// Where something is still missing, takes the last step that stays back for what does better and was set aside for it. That and its round.
+    fn set_aside(
+        &mut self,
+        verdict: Conclusion,
+        measurements: &Measurements<'_>,
+        work: &Work<'_>,
+    ) -> Result<Option<(Explanation, usize)>, FitError> {
+        let none = self.diagnoses.iter().all(|d| d.set_aside.is_none());
+        if none || self.concluded(verdict, work) != Conclusion::UnknownEffect {
+            return Ok(None);
+        }
+        let fit = self.settled(measurements, &work.silently())?;
+        work.go_on()?;
+        let last = self.steps.last();
+        let better = last.and_then(|last| set_aside(&self.diagnoses, last, work.criteria()));
+        let Some((better, round, diagnosis)) = better.filter(|_| self.take_back()) else {
+            self.settled = Some(fit);
+            return Ok(None);
+        };
+        self.diagnoses.truncate(round);
+        self.diagnoses.push(diagnosis);
+        Ok(Some((better, round)))
+    }
+
     /// Takes the last step back. Whether there was one.
     fn take_back(&mut self) -> bool {
         let without = self.without_last(&self.present.clone());
@@ -391,17 +428,12 @@ impl State {
         measurements: &Measurements<'_>,
         work: &Work<'_>,
     ) -> Result<Improvement, FitError> {
-        let settings = FitSettings::default();
-        let unfitted = |model: Model, step: &ImprovementStep| {
-            let error = step.nrmse_test;
-            Fit::cancelled(model, Method::OutputError, error, 0)
-        };
         let (best, verdict) = match verdict {
-            Conclusion::LogFaulty | Conclusion::DataInsufficient | Conclusion::NotFitted => {
-                (None, verdict)
-            }
-            Conclusion::Cancelled => (None, verdict),
-            _ => match self.settled(measurements, &settings, &work.silently()) {
+            Conclusion::LogFaulty
+            | Conclusion::DataInsufficient
+            | Conclusion::NotFitted
+            | Conclusion::Cancelled => (None, verdict),
+            _ => match self.settled(measurements, &work.silently()) {
                 Err(FitError::Cancelled(Cancelled)) => (None, Conclusion::Cancelled),
                 Ok(fit) if fit.cancelled => (Some(fit), Conclusion::Cancelled),
                 Err(error) => return Err(error),
@@ -413,9 +445,10 @@ impl State {
             },
         };
         let best = match verdict {
-            Conclusion::Cancelled => {
-                best.or_else(|| self.steps.last().map(|step| unfitted(self.present, step)))
-            }
+            Conclusion::Cancelled => best.or_else(|| {
+                let error = self.steps.last()?.nrmse_test;
+                Some(Fit::cancelled(self.present, Method::OutputError, error, 0))
+            }),
             _ => best,
         };
         Ok(Improvement {
@@ -435,9 +468,8 @@ mod tests {
 
     #[test]
     fn a_step_that_leads_nowhere_is_taken_back() {
-        let of = |level: f64| {
-            let text =
-                format!("[plant.dc_axis]\nK_A = -2.0\nK_C = {level}\n[log.measured.speed]\n");
+        let of = |gain: f64| {
+            let text = format!("[plant.dc_axis]\nK_A = -2.0\nK_C = {gain}\n[log.measured.speed]\n");
             Model::from_toml("axis.toml", &text).unwrap().0
         };
         let step = ImprovementStep::at_shaft;

@@ -138,6 +138,7 @@ mod scatter;
 mod score;
 mod search;
 mod sensitivities;
+mod set_aside;
 mod settings;
 mod sharpness;
 mod shows;

@@ -223,11 +223,17 @@ impl Search<'_> {
         let asked = self.worth_trying().is_some();
         let promises = Promises::new(self.nominal, asked);
         let promised = |attempts: Vec<Attempt>| -> Vec<Promising> {
-            let each = attempts.into_par_iter().filter_map(|(i, start)| {
-                let promise = promises.of(&self.all[i].chosen(&start), &start);
+            let each = attempts.into_par_iter().filter_map(|attempt| {
+                let promised = self.promise(&promises, attempt);
                 self.tell(Stage::Promises, &done, of);
-                Some((promise?, (i, start)))
+                promised
             });
+            each.collect()
+        };
+        // What starts so strong that even with its step it is another machine promises nothing. It is asked from next to nothing;
+        // times only while nothing explains the log, because any lag then promises a part of what friction does, and costs a fit.
+        let faintly = |strong: Vec<Promising>, times: bool| -> Vec<Promising> {
+            let each = (strong.into_par_iter()).map(|one| self.faintly(&promises, one, times));
             each.collect()
         };
         let mut all = promised(whole);
@@ -235,6 +241,8 @@ impl Search<'_> {
         let simple = |one: &&Promising| self.is_simple(one.1.0, &best);
         let first = best.iter().filter(simple).cloned();
         self.look_each(&attempts(first.take(FIRST_LOOKS)), looked, &|| {});
+        let unexplained = !self.is_explained(looked.error());
+        all = faintly(all, unexplained);
         // What another candidate promises, from the same start or else from its best one.
         let promised_by = |j: usize, start: &[f64]| {
             let of = || all.iter().filter(move |(_, (i, _))| *i == j);
@@ -261,10 +269,36 @@ impl Search<'_> {
                 asked
             });
         }
-        all.extend(promised(parts));
+        all.extend(faintly(promised(parts), unexplained));
         let best = self.best_of(all);
         self.work.know(|| self.promised(&best));
         best
+    }
+
+    /// What a candidate promises from a start.
+    fn promise(&self, promises: &Promises<'_>, (i, start): Attempt) -> Option<Promising> {
+        let promise = promises.of(&self.all[i].chosen(&start), &start)?;
+        Some((promise, (i, start)))
+    }
+
+    /// What a candidate promises from next to nothing, where that is more than from its start, which is too strong.
+    fn faintly(&self, promises: &Promises<'_>, strong: Promising, times: bool) -> Promising {
+        let (promise, (i, start)) = &strong;
+        if self.tells(promise.cost) {
+            return strong;
+        }
+        let faint = self.all[*i].faint(start, times);
+        let again = faint.and_then(|start| self.promise(promises, (*i, start)));
+        match again {
+            Some(again) if self.matters(again.0.cost) => again,
+            _ => strong,
+        }
+    }
+
+    /// Whether an effect that leaves this cost would explain enough to matter beside noise.
+    fn matters(&self, cost: f64) -> bool {
+        let least = self.work.criteria().missing.matters * self.nominal.floor;
+        cost <= self.nominal.cost - least.powi(2)
     }
 
     /// Whether a candidate grows from none of those that are `promising`.
@@ -368,7 +402,7 @@ impl Search<'_> {
         {
             return found;
         }
-        let again = candidate.faint(start).and_then(|faint| {
+        let again = candidate.faint(start, true).and_then(|faint| {
             let chosen = candidate.chosen(&faint);
             look(&chosen, &faint, self.nominal, worth)
         });

@@ -150,9 +150,7 @@ impl Diagnosis {
         let others = found.parameters.iter();
         let others = others.map(|(name, e)| (format!("{}.{name}", found.place.effect), e.clone()));
         both.parameters.extend(others);
-        self.candidates.retain(|c| c.place != first.place);
-        self.candidates.insert(0, both);
-        self.missing = Some(first.place.clone());
+        self.name(both);
         self.verdict = Conclusion::EffectMissing;
         self.residual_force = None;
         self.advice.clone_from(&second.advice);

@@ -68,7 +68,7 @@ fn with_fewer(model: &Model, steps: &[ImprovementStep]) -> Vec<Model> {
 
 /// The models with a twin in place of an effect, or with a sharper sign.
 fn with_others(model: &Model, steps: &[ImprovementStep], diagnoses: &[Diagnosis]) -> Vec<Model> {
-    let twins = |step| models(twins_in(model, step));
+    let twins = |step| models(twins_in(model, step, diagnoses));
     let earlier = steps.iter().filter(|step| is_earlier(step, diagnoses));
     let all = earlier.flat_map(twins);
     // The sharper sign takes longest.
@@ -266,7 +266,7 @@ fn is_exchanged(
     let criteria = best.work.criteria();
     let better = criteria.improve.better;
     let floor = diagnoses.last().map_or(0.0, |d| d.floor.nrmse);
-    let twins = twins_in(best.model, step).into_iter();
+    let twins = twins_in(best.model, step, diagnoses).into_iter();
     let (narrower, others): (Vec<_>, Vec<_>) =
         twins.partition(|(twin, _)| is_narrower(twin, place));
     let mut taken = best
@@ -288,12 +288,19 @@ fn is_exchanged(
 }
 
 /// The models with what the data could not tell from the effect of a `step` in its place.
-fn twins_in<'s>(model: &Model, step: &'s ImprovementStep) -> Vec<(&'s EffectAt, Model)> {
+fn twins_in<'s>(
+    model: &Model,
+    step: &'s ImprovementStep,
+    diagnoses: &[Diagnosis],
+) -> Vec<(&'s EffectAt, Model)> {
     let Some(place) = step.added.as_ref() else {
         return Vec::new();
     };
     let twins = step.twins.iter().filter(|twin| *twin != place);
-    let models = twins.filter_map(|twin| Some((twin, exchanged(model, place, twin)?)));
+    let models = twins.filter_map(|twin| {
+        let found = named(step, diagnoses, twin);
+        Some((twin, exchanged(model, place, twin, found)?))
+    });
     models.collect()
 }
 
@@ -326,7 +333,7 @@ pub(crate) fn still_open(
         .iter()
         .enumerate()
         .flat_map(|(index, step)| {
-            let twins = twins_in(model, step).into_iter();
+            let twins = twins_in(model, step, diagnoses).into_iter();
             twins.map(move |(twin, exchanged)| (index, twin, exchanged))
         })
         .collect();
@@ -348,7 +355,8 @@ pub(crate) fn still_open(
         if let Some((error, _)) = tried.iter().find(|(_, model)| same(model)) {
             return *error <= bar;
         }
-        let diagnosed = diagnosed(&steps[*index], diagnoses, twin).filter(|model| same(model));
+        let diagnosed = named(&steps[*index], diagnoses, twin).map(|twin| &twin.model);
+        let diagnosed = diagnosed.filter(|model| same(model));
         // One that a diagnosis fitted needs no other fit.
         diagnosed.is_some_and(|model| leaves(model).is_ok_and(|error| error <= bar))
             || alike
@@ -364,23 +372,13 @@ pub(crate) fn still_open(
     Ok(open)
 }
 
-/// The model that the diagnosis of a `step` fitted with the `twin` of its effect.
-fn diagnosed<'d>(
-    step: &ImprovementStep,
-    diagnoses: &'d [Diagnosis],
-    twin: &EffectAt,
-) -> Option<&'d Model> {
-    named(step, diagnoses, twin).map(|twin| &twin.model)
-}
-
 /// What the diagnosis that named a `step` says of a twin of it.
 fn named<'d>(
     step: &ImprovementStep,
     diagnoses: &'d [Diagnosis],
     twin: &EffectAt,
 ) -> Option<&'d Explanation> {
-    let candidates = &diagnoses.get(step.round?)?.candidates;
-    candidates.iter().find(|c| c.place == *twin)
+    diagnoses.get(step.round?)?.explanation(twin)
 }
 
 /// Whether two models have the same effects, with as many parameters that are fitted.
@@ -393,8 +391,13 @@ pub(crate) fn has_the_effects_of(model: &Model, other: &Model) -> bool {
 }
 
 /// The model with the effect of `other` in place of that of `place`. Parameters of the same name keep their
-/// values, others begin at a noticeable size.
-fn exchanged(model: &Model, place: &EffectAt, other: &EffectAt) -> Option<Model> {
+/// values, others begin as its diagnosis `found` them, or at a noticeable size.
+fn exchanged(
+    model: &Model,
+    place: &EffectAt,
+    other: &EffectAt,
+    found: Option<&Explanation>,
+) -> Option<Model> {
     let instances = instances(model, place);
     let (first, others) = instances.split_first()?;
     let known: Vec<&str> = model.effects[*first]
@@ -409,7 +412,12 @@ fn exchanged(model: &Model, place: &EffectAt, other: &EffectAt) -> Option<Model>
     let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
     for parameter in &mut candidate.parameters[own] {
         if parameter.free && !known.contains(&parameter.declaration.id) {
-            let start = parameter.value.unwrap_or(0.0) + parameter.scale();
+            let neutral = parameter.value.unwrap_or(0.0);
+            let found = found.and_then(|e| e.parameters.get(parameter.declaration.id));
+            let found = found
+                .map(|e| e.value)
+                .filter(|found| found.is_finite() && *found != neutral);
+            let start = found.unwrap_or(neutral + parameter.scale());
             parameter.value = Some(parameter.declaration.nearest(start));
         }
     }
@@ -429,7 +437,39 @@ pub(crate) fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
+    use loopsight_plants as _;
+
+    use std::collections::BTreeMap;
+
     use super::*;
+
+    #[test]
+    fn a_twin_begins_as_its_diagnosis_found_it() {
+        let friction = Explanation::at_shaft("coulomb_friction", 0.05);
+        let spring = Explanation::at_shaft("linear_stiffness", 0.05);
+        let start = |stiffness: Option<f64>| {
+            let estimate = |value| Estimate {
+                value,
+                unit: "V/rad".to_owned(),
+                std_error: None,
+                interval95: None,
+                verdict: ParameterVerdict::Good,
+            };
+            let found = stiffness.map(|value| Explanation {
+                parameters: BTreeMap::from([("stiffness".to_owned(), estimate(value))]),
+                ..spring.clone()
+            });
+            let (model, place) = (&friction.model, &friction.place);
+            let with = exchanged(model, place, &spring.place, found.as_ref()).unwrap();
+            let named = |p: &&ModelParameter| p.name == "linear_stiffness.stiffness";
+            with.parameters.iter().find(named).unwrap().value.unwrap()
+        };
+        let declared = start(None);
+        assert!(declared > 0.0);
+        assert_eq!(start(Some(0.0017)), 0.0017);
+        // From nothing a fit may not come away.
+        assert_eq!(start(Some(0.0)), declared);
+    }
 
     #[test]
     fn an_effect_that_became_an_earlier_one_is_no_further_step() {

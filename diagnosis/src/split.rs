@@ -121,8 +121,7 @@ fn divide(
         steps[index] = both;
         return Ok(());
     }
-    let candidates = diagnosis.map_or(&[][..], |diagnosis| &diagnosis.candidates);
-    let named = candidates.iter().find(|named| named.place == first);
+    let named = diagnosis.and_then(|diagnosis| diagnosis.explanation(&first));
     let mut alone = ImprovementStep {
         added: Some(first),
         ..step.clone()
@@ -176,14 +175,13 @@ pub(crate) fn second_anew(
 
 /// What does about as well as the effect at `place` by itself, where a diagnosis has it among its explanations.
 fn as_good(place: &EffectAt, diagnosis: &Diagnosis, better: f64) -> Vec<EffectAt> {
-    let candidates = &diagnosis.candidates;
-    let Some(own) = candidates.iter().find(|named| named.place == *place) else {
+    let Some(own) = diagnosis.explanation(place) else {
         return Vec::new();
     };
     let near = |other: &&Explanation| {
         better * other.nrmse <= own.nrmse && better * own.nrmse <= other.nrmse
     };
-    (candidates.iter().filter(near))
+    (diagnosis.candidates.iter().filter(near))
         .map(|other| other.place.clone())
         .collect()
 }

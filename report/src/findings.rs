@@ -127,6 +127,7 @@ pub(crate) fn diagnosis(verdict: Conclusion) -> Diagnosis {
         observer: None,
         model: (!refused).then(|| model(0)),
         nominal_fit: if refused { f64::NAN } else { 0.1 },
+        set_aside: None,
     }
 }
 

@@ -51,7 +51,8 @@ impl Effect for InputPower {
                 .or(1.0)
                 .nonlinear()
                 .scaled(0.5)
-                .starting_at(&[0.5, 2.0, 3.0]),
+                // The first hardly acts: what it promises is linear, either way.
+                .starting_at(&[1.02, 0.5, 2.0, 3.0]),
             Parameter::new(
                 "reference",
                 "r",
