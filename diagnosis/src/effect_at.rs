@@ -1,5 +1,6 @@
 //! An effect and where it is.
 
+use loopsight_model::model::{Attached, Model};
 use serde::Serialize;
 
 /// An effect at its channels.
@@ -9,4 +10,15 @@ pub struct EffectAt {
     pub effect: String,
     /// Ids of the channels.
     pub at: Vec<String>,
+}
+
+/// Indices of a step's effect in `model`: one, or one for each of its channels; none when another effect has
+/// replaced it.
+pub(crate) fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
+    let of_place = |e: &Attached| {
+        e.meta.id == place.effect && e.at.iter().all(|c| place.at.iter().any(|at| at == c.id))
+    };
+    (0..model.effects.len())
+        .filter(|index| of_place(&model.effects[*index]))
+        .collect()
 }

@@ -385,8 +385,7 @@ impl State {
             self.settled = Some(fit);
             return Ok(None);
         };
-        self.diagnoses.truncate(round);
-        self.diagnoses.push(diagnosis);
+        self.diagnoses.splice(round.., [diagnosis]);
         Ok(Some((better, round)))
     }
 

@@ -6,7 +6,7 @@ use loopsight_model::model::{Attached, Model, ModelParameter};
 use rayon::prelude::*;
 
 use crate::conclusion::{Diagnosis, Explanation};
-use crate::effect_at::EffectAt;
+use crate::effect_at::{EffectAt, instances};
 use crate::error::FitError;
 use crate::estimate::{Estimate, ParameterVerdict, strength_is_determined};
 use crate::fitted::Fit;
@@ -14,7 +14,8 @@ use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
 use crate::progress::Work;
 use crate::refined::{Alike, Refined};
-use crate::sharpness::{sharpened, sharper, softened};
+use crate::sharpness::{sharpened, sharper_ones, softened};
+use crate::simplify::{free, simpler, simplified};
 use crate::split::split;
 
 /// Corrects `model` after the last of `steps`:
@@ -23,7 +24,7 @@ use crate::split::split;
 /// * a simpler effect replaces one that contains it, where the error hardly grows; so do two with fewer parameters;
 /// * an effect that the last of the `diagnoses` did not name is replaced by a twin, which the data could not tell from it when it
 ///   was added, where the error falls; by the same effect at fewer places only where nothing else is missing then;
-/// * the sign of the last effect is made sharper while the error falls, and those of the others softer
+/// * the sign of the last effect is made sharper while the error falls, and then those of the others; these are made softer
 ///   where little but noise is left.
 ///
 /// The steps are changed with the model. If the work is cancelled, the two still agree. None where the last step is no
@@ -66,13 +67,14 @@ fn with_fewer(model: &Model, steps: &[ImprovementStep]) -> Vec<Model> {
     all
 }
 
-/// The models with a twin in place of an effect, or with a sharper sign.
+/// The models with a twin in place of an effect, or with sharper signs.
 fn with_others(model: &Model, steps: &[ImprovementStep], diagnoses: &[Diagnosis]) -> Vec<Model> {
     let twins = |step| models(twins_in(model, step, diagnoses));
     let earlier = steps.iter().filter(|step| is_earlier(step, diagnoses));
     let all = earlier.flat_map(twins);
-    // The sharper sign takes longest.
-    sharper(model, steps).into_iter().chain(all).collect()
+    // The sharper signs take longest.
+    let sharper = sharper_ones(model, steps).into_iter();
+    sharper.chain(all).collect()
 }
 
 /// The models of some candidates.
@@ -193,43 +195,6 @@ fn without(model: &Model, effects: &[usize]) -> Option<Model> {
         .iter()
         .rev()
         .try_fold(model.clone(), |model, index| model.without_effect(*index))
-}
-
-/// Parameters that are fitted.
-pub(crate) fn free(model: &Model) -> usize {
-    model.parameters.iter().filter(|p| p.free).count()
-}
-
-/// Replaces an added effect by a simpler one that it contains, where the error hardly grows: what looked like
-/// breakaway friction may have been friction with a delay that was still missing. The step then names the
-/// simpler effect.
-fn simplified(best: &mut Refined<'_>, steps: &mut [ImprovementStep]) -> Result<(), FitError> {
-    let criteria = &best.work.criteria().choice;
-    for place in steps.iter_mut().filter_map(|step| step.added.as_mut()) {
-        let many = free(best.model);
-        let share = |model: &Model| criteria.allowance(many, free(model));
-        if let Some(id) = best.takes(simpler(best.model, place), share)? {
-            id.clone_into(&mut place.effect);
-        }
-    }
-    Ok(())
-}
-
-/// The models with a simpler effect in place of the one at `place`, by its id.
-fn simpler(model: &Model, place: &EffectAt) -> Vec<(&'static str, Model)> {
-    let instances = instances(model, place);
-    let Some(effect) = instances.first().map(|i| &model.effects[*i]) else {
-        return Vec::new();
-    };
-    let ids = effect.meta.simpler.iter();
-    let models = ids.filter_map(|id| {
-        let candidate = instances.iter().try_fold(model.clone(), |model, i| {
-            let at: Vec<&str> = model.effects[*i].at.iter().map(|c| c.id).collect();
-            model.with_effect_replaced(*i, id, &at)
-        });
-        Some((*id, candidate?))
-    });
-    models.collect()
 }
 
 /// Replaces added effects by ones that the data could not tell from them at first, where the error falls: once
@@ -422,17 +387,6 @@ fn exchanged(
         }
     }
     Some(candidate)
-}
-
-/// Indices of a step's effect in `model`: one, or one for each of its channels; none when another effect has
-/// replaced it.
-pub(crate) fn instances(model: &Model, place: &EffectAt) -> Vec<usize> {
-    let of_place = |e: &Attached| {
-        e.meta.id == place.effect && e.at.iter().all(|c| place.at.iter().any(|at| at == c.id))
-    };
-    (0..model.effects.len())
-        .filter(|index| of_place(&model.effects[*index]))
-        .collect()
 }
 
 #[cfg(test)]

@@ -4,11 +4,13 @@ use std::borrow::Cow;
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::commands::Commands;
 use crate::compare::{error_over, free_run_error};
 use crate::error::{CompareError, FitError};
+use crate::in_place::Motion;
 use crate::measurements::Measurements;
 use crate::observer::{attach_observer, attach_same_observer};
 use crate::output_error::{Unaided, fitted_values};
@@ -147,15 +149,29 @@ impl<'a> Refined<'a> {
 
     /// How fast and how far it moves: root mean squares of its signals; and what drives it.
     pub(crate) fn moves(&mut self) -> Result<(Vec<f64>, Commands), FitError> {
+        self.running(|model, states, runs, work| {
+            let rms = signal_rms(model, &model.values(), states, runs, work)?;
+            Ok((rms, Commands::of(model, runs)))
+        })
+    }
+
+    /// Its motion.
+    pub(crate) fn motion(&mut self) -> Result<Motion, FitError> {
+        self.running(Motion::of)
+    }
+
+    /// What is `asked` of its free runs.
+    fn running<T>(
+        &mut self,
+        asked: impl FnOnce(&Model, &[DVector<f64>], &[Run], &Work<'_>) -> Result<T, Cancelled>,
+    ) -> Result<T, FitError> {
         let silent = self.work.silently();
         let alike = self.take_alike(&silent)?;
-        let model: &Model = self.model;
-        let (values, runs) = (model.values(), &alike.runs);
-        let states = InitialStates::estimate(model, &values, runs, &silent)?.states;
-        let rms = signal_rms(model, &values, &states, runs, &silent)?;
-        let commands = Commands::of(model, runs);
+        let (model, runs): (&Model, _) = (self.model, &alike.runs);
+        let states = InitialStates::estimate(model, &model.values(), runs, &silent)?.states;
+        let told = asked(model, &states, runs, &silent);
         self.alike = Some(alike);
-        Ok((rms, commands))
+        Ok(told?)
     }
 
     /// The error of the present model after a short fit, once it was computed.

@@ -2,17 +2,26 @@
 
 use loopsight_model::model::{Model, Origin};
 
+use crate::effect_at::instances;
 use crate::error::FitError;
 use crate::improvement::ImprovementStep;
-use crate::refine::instances;
 use crate::refined::Refined;
 
 /// Most halvings, and most doublings.
 const HALVINGS: usize = 3;
 
-/// Halves the smoothing width of the effect that the last of `steps` added while that lowers the error.
+/// Halves the smoothing width of the effect that the last of `steps` added while that lowers the error, then those of the others: a
+/// sign that makes up for what was still missing is softer than its own.
 pub(crate) fn sharpened(best: &mut Refined<'_>, steps: &[ImprovementStep]) -> Result<(), FitError> {
-    while_better(best, |model| sharper(model, steps))
+    while_better(best, |model| sharper(model, &added_last(model, steps)))?;
+    while_better(best, |model| sharper(model, &added_before(model, steps)))
+}
+
+/// The models that this begins with.
+pub(crate) fn sharper_ones(model: &Model, steps: &[ImprovementStep]) -> Vec<Model> {
+    let effects = [added_last(model, steps), added_before(model, steps)];
+    let models = effects.iter().filter_map(|of| sharper(model, of));
+    models.collect()
 }
 
 /// Doubles the smoothing widths of the effects that were added before while that lowers the error. Each was found where the model
@@ -48,18 +57,22 @@ fn while_better(
     Ok(())
 }
 
-/// The model with half the smoothing width of the effect that was added last; none where that has none.
-pub(crate) fn sharper(model: &Model, steps: &[ImprovementStep]) -> Option<Model> {
-    times_as_wide(model, &added_last(model, steps), 0.5)
+/// The model with half the widths that a log gave the signs of some effects; none where there is no such.
+fn sharper(model: &Model, effects: &[usize]) -> Option<Model> {
+    times_as_wide(model, effects, 0.5)
 }
 
 /// The model with twice the widths that a log gave the signs of other effects; none where there is no such.
 fn softer(model: &Model, steps: &[ImprovementStep]) -> Option<Model> {
+    times_as_wide(model, &added_before(model, steps), 2.0)
+}
+
+/// The effects that were there before the last step.
+fn added_before(model: &Model, steps: &[ImprovementStep]) -> Vec<usize> {
     let last = added_last(model, steps);
-    let before: Vec<usize> = (0..model.effects.len())
+    (0..model.effects.len())
         .filter(|i| !last.contains(i))
-        .collect();
-    times_as_wide(model, &before, 2.0)
+        .collect()
 }
 
 /// The effect that the last step added: one, or one for each of its channels.

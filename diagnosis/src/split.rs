@@ -8,14 +8,15 @@ use loopsight_model::registry;
 
 use crate::conclusion::{Diagnosis, Explanation};
 use crate::diagnose::{Aim, diagnose_for};
-use crate::effect_at::EffectAt;
+use crate::effect_at::{EffectAt, instances};
 use crate::error::FitError;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
 use crate::moves::Moves;
 use crate::progress::Work;
-use crate::refine::{free, instances, without_steps};
+use crate::refine::without_steps;
 use crate::refined::{Alike, Refined};
+use crate::simplify::free;
 use crate::suited::suit;
 
 /// Two effects in place of one: those of `first` and `second`, at its channels.
@@ -40,6 +41,9 @@ pub(crate) fn split(
         };
         if !candidates.is_empty() {
             let (rms, commands) = best.moves()?;
+            let whole = steps[index].added.iter();
+            let whole: Vec<usize> = whole.flat_map(|p| instances(best.model, p)).collect();
+            let motion = best.motion()?;
             let sign_width = best.work.criteria().search.sign_width;
             for (_, both) in &mut candidates {
                 suit(both, &rms, &commands, sign_width);
@@ -49,6 +53,9 @@ pub(crate) fn split(
                     let start = parameter.value.unwrap_or(0.0) + moves.first_step(parameter);
                     parameter.value = Some(parameter.declaration.nearest(start));
                 }
+                let second = both.effects.len() - 1;
+                let own: Vec<usize> = whole.iter().copied().chain([second]).collect();
+                motion.begin(both, &own);
             }
         }
         if let Some(Split { first, second }) = best.takes(candidates, |_| close)? {

@@ -3,6 +3,7 @@
 use loopsight_core::{NoPast, Place};
 
 use super::Simulator;
+use super::stiff::Way;
 use crate::registry::HostReal;
 
 impl<S: HostReal> Simulator<'_, S> {
@@ -38,6 +39,16 @@ impl<S: HostReal> Simulator<'_, S> {
         for (to, from) in self.scratch.held[..inputs.len()].iter_mut().zip(inputs) {
             *to = S::of(*from);
         }
+    }
+
+    /// The rates of the plant's states now, 1/s of their units; effects with a memory have passed the inputs on already.
+    pub fn rates(&mut self) -> &[S] {
+        let memory = std::mem::take(&mut self.bounds.input_memory);
+        let slopes = std::mem::take(&mut self.slopes);
+        let way = std::mem::replace(&mut self.way, Way::Linearise);
+        self.step(self.time, 0.0, 1);
+        (self.way, self.slopes, self.bounds.input_memory) = (way, slopes, memory);
+        &self.implicit.rates()[..self.model.n_states()]
     }
 
     /// What an effect of the model, by index, adds to efforts and to rates of states now: place by place.

@@ -139,6 +139,11 @@ impl<S: HostReal> Implicit<S> {
         }
     }
 
+    /// The rates where the Jacobian was made.
+    pub(super) fn rates(&self) -> &[S] {
+        &self.rate
+    }
+
     /// The fastest rate at the Jacobian: its spectral radius, by Gelfand's formula `‖Aⁿ‖^(1/n)`.
     pub(super) fn fastest(&self) -> f64 {
         let mut power = self.jacobian.clone();
