@@ -51,3 +51,16 @@ fn an_axis_has_stops_play_and_a_shaft_that_bends() {
     let effects = ["backlash", "elastic_coupling", "end_stop"];
     found(Robot::Axis, &hidden, 309, &effects);
 }
+
+/// Where friction holds the machine, the long steps of a first look said nothing of the other two.
+#[test]
+#[ignore = "30 s in a release build"]
+fn a_twil_has_friction_scrub_and_a_power_law_of_its_inputs() {
+    let hidden = [
+        (Hidden::CoulombFriction, 2.0),
+        (Hidden::InputPower, 1.0),
+        (Hidden::ScrubFriction, 2.0),
+    ];
+    let effects = ["coulomb_friction", "input_power", "scrub_friction"];
+    found(Robot::Twil, &hidden, 314, &effects);
+}

@@ -15,8 +15,8 @@ const BEND: f64 = 0.01;
 const SAME: f64 = 1e-6;
 
 impl<S: HostReal> Simulator<'_, S> {
-    /// Integrates over `span` with as few equal steps as the motion allows, and `most` where it allows none longer. It uses
-    /// values alone, so a simulation and its derivatives take the same steps.
+    /// Integrates over `span` with as few equal steps as the motion allows, and `most` where it allows none longer, or more where so
+    /// few would not be stable. It uses values alone, so a simulation and its derivatives take the same steps.
     ///
     /// The stages of a step say whether it was short enough ([`Dynamics::steps`](loopsight_core::Dynamics::steps)), so one that
     /// was costs nothing beside itself. After one that was not, as many are made as its bend asks for. None is longer than what
@@ -30,13 +30,28 @@ impl<S: HostReal> Simulator<'_, S> {
         self.watched.now = true;
         self.watched.before.clone_from(&self.x);
         let [at_rest, beyond] = self.watched.stable;
-        let longest = if self.may_stick() { at_rest } else { beyond };
-        let least = substeps(span, longest).min(most);
+        let sticking = substeps(span, at_rest);
+        let mut sticks = self.may_stick();
+        let least = if sticks {
+            sticking
+        } else {
+            substeps(span, beyond)
+        };
+        let mut most = most.max(least);
         let mut steps = self.watched.steps.clamp(least, most);
         loop {
             self.watched.bend = 0.0;
             self.integrate(input, span, steps, true);
-            if steps == most || self.watched.bend <= BEND {
+            if self.watched.bend <= BEND {
+                break;
+            }
+            // One step from where it moves to where it sticks, or beyond, would make the derivatives grow as well.
+            if !sticks && steps < sticking && self.comes_to_rest() {
+                (sticks, steps, most) = (true, sticking, most.max(sticking));
+                self.x.clone_from(&self.watched.before);
+                continue;
+            }
+            if steps == most {
                 break;
             }
             // Over a step of half the length rates bend by a quarter as much.
@@ -55,13 +70,24 @@ impl<S: HostReal> Simulator<'_, S> {
     /// Whether dry friction may hold some part of the machine: a speed is so slow that its sign has a slope, or it is not known
     /// which speeds have a sign.
     fn may_stick(&mut self) -> bool {
-        if self.watched.slow.is_empty() {
-            return true;
-        }
         self.refresh();
+        let watched = &mut self.watched;
         let signals = &self.scratch.signals;
-        let fast = |(speed, far): &(usize, f64)| signals[*speed].value().abs() > *far;
-        !self.watched.slow.iter().all(fast)
+        watched.speeds.clear();
+        let speeds = watched.slow.iter();
+        (watched.speeds).extend(speeds.map(|(speed, _)| signals[*speed].value()));
+        let fast = |((_, far), speed): (&(usize, f64), &f64)| speed.abs() > *far;
+        watched.slow.is_empty() || !watched.slow.iter().zip(&watched.speeds).all(fast)
+    }
+
+    /// Whether a speed that had no slope of a sign at the start of the interval has one now, or is the other way.
+    fn comes_to_rest(&mut self) -> bool {
+        self.refresh();
+        let (watched, signals) = (&self.watched, &self.scratch.signals);
+        (watched.slow.iter().zip(&watched.speeds)).any(|((speed, far), before)| {
+            let now = signals[*speed].value();
+            now.abs() <= *far || now * before < 0.0
+        })
     }
 
     /// Whether an input that effects take from its past changes within the next `span`.

@@ -363,7 +363,7 @@ impl<'m, S: HostReal> Simulator<'m, S> {
         let steps = self.length.steps(span);
         if self.lengthens(steps) {
             self.advance_lengthened(input, span, steps);
-        } else if steps > 1 && self.goes_by_motion() {
+        } else if (steps > 1 || self.watched.steps_are_short(span)) && self.goes_by_motion() {
             self.advance_by_motion(input, span, steps);
         } else {
             self.integrate(input, span, steps, true);

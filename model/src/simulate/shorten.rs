@@ -33,17 +33,19 @@ impl<S: HostReal> Simulator<'_, S> {
             return;
         }
         let sticking = self.fastest_either_way(!widths.is_empty());
-        self.watched.stable = [STABLE / sticking; 2];
+        let least = SHORTEST * self.model.usual_step();
+        let stable = |rate: f64| (STABLE / rate).max(least);
+        self.watched.stable = [stable(sticking); 2];
         if self.model.by_motion {
             self.watched.slow = self.slow(&widths);
         }
-        let stable = as_usual || self.length.longest * sticking <= STABLE;
-        if stable && self.watched.slow.is_empty() {
+        let as_long = as_usual || self.length.longest * sticking <= STABLE;
+        if as_long && self.watched.slow.is_empty() {
             return;
         }
         let moving = self.fastest_beyond(&widths);
-        self.watched.stable[1] = STABLE / moving;
-        if stable {
+        self.watched.stable[1] = stable(moving);
+        if as_long {
             return;
         }
         // What is too fast for the usual step without friction is no matter of friction.

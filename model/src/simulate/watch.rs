@@ -16,6 +16,8 @@ pub(super) struct Watched<S> {
     pub(super) stable: [f64; 2],
     /// Speeds, as signals by index, and how fast each must be so that nothing sticks; empty where that is not known.
     pub(super) slow: Vec<(usize, f64)>,
+    /// How fast these were at the start of the interval.
+    pub(super) speeds: Vec<f64>,
     /// The states at the start of the interval.
     pub(super) before: Vec<S>,
     /// The rate of each state over the present step.
@@ -23,6 +25,11 @@ pub(super) struct Watched<S> {
 }
 
 impl<S> Watched<S> {
+    /// Whether a step over `span` might not be stable.
+    pub(super) fn steps_are_short(&self, span: f64) -> bool {
+        self.stable.iter().any(|longest| span > *longest)
+    }
+
     /// Nothing is known yet.
     pub(super) fn new() -> Self {
         Self {
@@ -31,6 +38,7 @@ impl<S> Watched<S> {
             steps: 1,
             stable: [f64::INFINITY; 2],
             slow: Vec::new(),
+            speeds: Vec::new(),
             before: Vec::new(),
             rates: Vec::new(),
         }
