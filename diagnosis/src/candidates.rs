@@ -274,8 +274,7 @@ pub(crate) fn candidates(
             });
             let replaces = contained.map(|index| {
                 let effect = &model.effects[index];
-                let first = effect.first_parameter;
-                (effect.meta.id, first..first + effect.meta.parameters.len())
+                (effect.meta.id, effect.own())
             });
             let base = match contained {
                 Some(index) => model.without_effect(index),

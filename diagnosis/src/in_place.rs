@@ -80,7 +80,7 @@ impl Motion {
         let sizes: Vec<usize> = (0..model.parameters.len()).filter(linear).collect();
         let mut values = model.values();
         for effect in effects.iter().map(|i| &model.effects[*i]) {
-            let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+            let own = effect.own();
             for i in own.filter(|i| sizes.contains(i)) {
                 values[i] = model.parameters[i].declaration.default.unwrap_or(0.0);
             }

@@ -144,7 +144,7 @@ pub(crate) fn estimated<'f>(
     let instances = step.added.iter().flat_map(|place| instances(model, place));
     let of_effect = |i: usize| {
         let effect = &model.effects[i];
-        let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+        let own = effect.own();
         model.parameters[own].iter()
     };
     (instances.flat_map(of_effect))
@@ -156,10 +156,7 @@ pub(crate) fn estimated<'f>(
 /// in the fit `alone` has at least `times` the standard error in the fit `with` the added one.
 pub(crate) fn blurs(alone: &Fit, with: &Fit, undetermined: f64, times: f64) -> bool {
     let effects = alone.model.effects.iter();
-    let mut names = effects.flat_map(|effect| {
-        let parameters = alone.model.parameters.iter().skip(effect.first_parameter);
-        parameters.take(effect.meta.parameters.len())
-    });
+    let mut names = effects.flat_map(|effect| &alone.model.parameters[effect.own()]);
     names.any(|parameter| {
         let estimates = [alone, with].map(|fit| fit.parameters.get(&parameter.name));
         let [Some(before), Some(after)] = estimates else {
@@ -374,7 +371,7 @@ fn exchanged(
     let at: Vec<&str> = other.at.iter().map(String::as_str).collect();
     let mut candidate = without(model, others)?.with_effect_replaced(*first, &other.effect, &at)?;
     let effect = &candidate.effects[*first];
-    let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+    let own = effect.own();
     for parameter in &mut candidate.parameters[own] {
         if parameter.free && !known.contains(&parameter.declaration.id) {
             let neutral = parameter.value.unwrap_or(0.0);

@@ -4,7 +4,6 @@ use std::borrow::Cow;
 
 use loopsight_model::model::Model;
 use loopsight_model::run::Run;
-use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::commands::Commands;
@@ -147,31 +146,18 @@ impl<'a> Refined<'a> {
         }
     }
 
-    /// How fast and how far it moves: root mean squares of its signals; and what drives it.
-    pub(crate) fn moves(&mut self) -> Result<(Vec<f64>, Commands), FitError> {
-        self.running(|model, states, runs, work| {
-            let rms = signal_rms(model, &model.values(), states, runs, work)?;
-            Ok((rms, Commands::of(model, runs)))
-        })
-    }
-
-    /// Its motion.
-    pub(crate) fn motion(&mut self) -> Result<Motion, FitError> {
-        self.running(Motion::of)
-    }
-
-    /// What is `asked` of its free runs.
-    fn running<T>(
-        &mut self,
-        asked: impl FnOnce(&Model, &[DVector<f64>], &[Run], &Work<'_>) -> Result<T, Cancelled>,
-    ) -> Result<T, FitError> {
+    /// How fast and how far it moves: root mean squares of its signals; what drives it; and its motion.
+    pub(crate) fn moves(&mut self) -> Result<(Vec<f64>, Commands, Motion), FitError> {
         let silent = self.work.silently();
         let alike = self.take_alike(&silent)?;
-        let (model, runs): (&Model, _) = (self.model, &alike.runs);
-        let states = InitialStates::estimate(model, &model.values(), runs, &silent)?.states;
-        let told = asked(model, &states, runs, &silent);
+        let model: &Model = self.model;
+        let (values, runs) = (model.values(), &alike.runs);
+        let states = InitialStates::estimate(model, &values, runs, &silent)?.states;
+        let rms = signal_rms(model, &values, &states, runs, &silent)?;
+        let motion = Motion::of(model, &states, runs, &silent)?;
+        let commands = Commands::of(model, runs);
         self.alike = Some(alike);
-        Ok(told?)
+        Ok((rms, commands, motion))
     }
 
     /// The error of the present model after a short fit, once it was computed.

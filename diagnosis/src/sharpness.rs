@@ -86,7 +86,7 @@ fn times_as_wide(model: &Model, effects: &[usize], times: f64) -> Option<Model> 
     let mut candidate = model.clone();
     let mut any = false;
     for effect in effects.iter().map(|i| &model.effects[*i]) {
-        let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+        let own = effect.own();
         for parameter in &mut candidate.parameters[own] {
             let known = parameter.free || parameter.origin != Origin::Log;
             if known || !parameter.declaration.is_width() {

@@ -23,6 +23,8 @@ use crate::suited::suit;
 struct Split {
     first: &'static str,
     second: &'static str,
+    /// Their indices in the model with both.
+    at: [usize; 2],
 }
 
 /// Replaces an added effect by a simpler one that it contains and a second one that it does not, where both together have fewer
@@ -40,12 +42,9 @@ pub(crate) fn split(
             None => Vec::new(),
         };
         if !candidates.is_empty() {
-            let (rms, commands) = best.moves()?;
-            let whole = steps[index].added.iter();
-            let whole: Vec<usize> = whole.flat_map(|p| instances(best.model, p)).collect();
-            let motion = best.motion()?;
+            let (rms, commands, motion) = best.moves()?;
             let sign_width = best.work.criteria().search.sign_width;
-            for (_, both) in &mut candidates {
+            for (split, both) in &mut candidates {
                 suit(both, &rms, &commands, sign_width);
                 let moves = Moves::of_last(both, &rms, &commands);
                 let own = both.effects.last().map_or(0, |e| e.first_parameter);
@@ -53,12 +52,10 @@ pub(crate) fn split(
                     let start = parameter.value.unwrap_or(0.0) + moves.first_step(parameter);
                     parameter.value = Some(parameter.declaration.nearest(start));
                 }
-                let second = both.effects.len() - 1;
-                let own: Vec<usize> = whole.iter().copied().chain([second]).collect();
-                motion.begin(both, &own);
+                motion.begin(both, &split.at);
             }
         }
-        if let Some(Split { first, second }) = best.takes(candidates, |_| close)? {
+        if let Some(Split { first, second, .. }) = best.takes(candidates, |_| close)? {
             divide(best, steps, index, [first, second], diagnoses)?;
         }
         index += 1;
@@ -88,8 +85,12 @@ fn splits(model: &Model, place: &EffectAt) -> Vec<(Split, Model)> {
                 continue;
             };
             if free(&both) < free(model) {
-                let second = second.id;
-                found.push((Split { first, second }, both));
+                let split = Split {
+                    first,
+                    second: second.id,
+                    at: [instance, both.effects.len() - 1],
+                };
+                found.push((split, both));
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::candidates::Candidate;
 use crate::conclusion::Explanation;
+use crate::effect_at::instances;
 use crate::estimate::ParameterVerdict;
 
 /// Whether an effect has any size: a parameter whose neutral value is zero is above the share `least` of its
@@ -14,19 +15,9 @@ pub(crate) fn does_something(
     shift: f64,
 ) -> bool {
     let model = &explanation.model;
-    let place = &explanation.place;
-    let own = model.effects.iter().filter(|effect| {
-        effect.meta.id == place.effect
-            && effect
-                .at
-                .iter()
-                .all(|c| place.at.iter().any(|at| at == c.id))
-    });
-    let free: Vec<_> = own
-        .flat_map(|effect| {
-            let parameters = model.parameters.iter().skip(effect.first_parameter);
-            parameters.take(effect.meta.parameters.len())
-        })
+    let instances = instances(model, &explanation.place);
+    let free: Vec<_> = (instances.iter())
+        .flat_map(|i| &model.parameters[model.effects[*i].own()])
         .filter(|p| p.free)
         .collect();
     let has_size = free.iter().any(|p| p.declaration.default == Some(0.0));

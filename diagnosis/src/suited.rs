@@ -26,7 +26,7 @@ const LEAST: f64 = 0.01;
 pub(crate) fn scale_efforts(model: &mut Model, commands: &Commands) {
     for k in 0..model.effects.len() {
         let effect = &model.effects[k];
-        let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+        let own = effect.own();
         let channel = effect.at.first().copied();
         let effort = channel.filter(|c| matches!(c.place, Place::Effort(_)));
         let Some(channel) = effort else { continue };

@@ -438,7 +438,7 @@ impl Model {
     /// When there is no such effect, or there are fewer values than the model has parameters.
     pub fn effort_at<S: HostReal>(&self, effect: usize, values: &[S], flow: S) -> S {
         let effect = &self.effects[effect];
-        let own = effect.first_parameter..effect.first_parameter + effect.meta.parameters.len();
+        let own = effect.own();
         let at = Reading::nothing().with(Role::Flow, &flow);
         S::physics(effect.physics).contribution(&at, &[], &values[own])
     }

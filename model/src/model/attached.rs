@@ -1,5 +1,7 @@
 //! Effects and measured signals of a composed model.
 
+use std::ops::Range;
+
 use loopsight_core::{Channel, EffectMeta, Role, Signal};
 
 use crate::registry::AnyPhysics;
@@ -22,6 +24,11 @@ pub struct Attached {
 }
 
 impl Attached {
+    /// Its parameters in [`Model::parameters`](super::Model::parameters).
+    pub fn own(&self) -> Range<usize> {
+        self.first_parameter..self.first_parameter + self.meta.parameters.len()
+    }
+
     /// Whether it is the same effect at the same channels as `other`.
     pub fn is_same(&self, other: &Self) -> bool {
         let others = other.at.iter().map(|c| c.id);

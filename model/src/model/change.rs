@@ -116,8 +116,7 @@ impl Model {
         model.effects.clear();
         model.parameters.truncate(self.n_plant_parameters);
         for (k, effect) in self.effects.iter().enumerate() {
-            let first = effect.first_parameter;
-            let own = &self.parameters[first..first + effect.meta.parameters.len()];
+            let own = &self.parameters[effect.own()];
             if k == index {
                 model = change(model, own)?;
             } else {

@@ -70,6 +70,9 @@ impl<S: HostReal> Simulator<'_, S> {
     /// Whether dry friction may hold some part of the machine: a speed is so slow that its sign has a slope, or it is not known
     /// which speeds have a sign.
     fn may_stick(&mut self) -> bool {
+        if self.watched.slow.is_empty() {
+            return true;
+        }
         self.refresh();
         let watched = &mut self.watched;
         let signals = &self.scratch.signals;
@@ -77,7 +80,7 @@ impl<S: HostReal> Simulator<'_, S> {
         let speeds = watched.slow.iter();
         (watched.speeds).extend(speeds.map(|(speed, _)| signals[*speed].value()));
         let fast = |((_, far), speed): (&(usize, f64), &f64)| speed.abs() > *far;
-        watched.slow.is_empty() || !watched.slow.iter().zip(&watched.speeds).all(fast)
+        !watched.slow.iter().zip(&watched.speeds).all(fast)
     }
 
     /// Whether a speed that had no slope of a sign at the start of the interval has one now, or is the other way.

@@ -187,11 +187,16 @@ impl<S: HostReal> Simulator<'_, S> {
     /// Jacobian is the one there afterwards.
     pub(super) fn fastest(&mut self, input: &[f64], elapsed: f64) -> f64 {
         self.apply(input, elapsed);
+        self.linearise(self.time + elapsed);
+        self.implicit.fastest()
+    }
+
+    /// Keeps the rates of the model where it is now, at a `time`, and their Jacobian.
+    pub(super) fn linearise(&mut self, time: f64) {
         self.way = Way::Linearise;
         // What an input does later is no part of it, and nothing is to be remembered.
         let slopes = std::mem::take(&mut self.slopes);
-        self.step(self.time + elapsed, 0.0, 1);
+        self.step(time, 0.0, 1);
         self.slopes = slopes;
-        self.implicit.fastest()
     }
 }

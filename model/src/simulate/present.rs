@@ -3,7 +3,6 @@
 use loopsight_core::{NoPast, Place};
 
 use super::Simulator;
-use super::stiff::Way;
 use crate::registry::HostReal;
 
 impl<S: HostReal> Simulator<'_, S> {
@@ -41,13 +40,12 @@ impl<S: HostReal> Simulator<'_, S> {
         }
     }
 
-    /// The rates of the plant's states now, 1/s of their units; effects with a memory have passed the inputs on already.
+    /// The rates of the plant's states now, each in its unit per second. Effects with a memory have passed the inputs on already.
     pub fn rates(&mut self) -> &[S] {
         let memory = std::mem::take(&mut self.bounds.input_memory);
-        let slopes = std::mem::take(&mut self.slopes);
-        let way = std::mem::replace(&mut self.way, Way::Linearise);
-        self.step(self.time, 0.0, 1);
-        (self.way, self.slopes, self.bounds.input_memory) = (way, slopes, memory);
+        let way = self.way;
+        self.linearise(self.time);
+        (self.way, self.bounds.input_memory) = (way, memory);
         &self.implicit.rates()[..self.model.n_states()]
     }
 
