@@ -16,7 +16,6 @@ use crate::pairs::pair;
 use crate::progress::{Cancelled, Work};
 use crate::refine::{
     blurs, estimated, has_the_effects_of, is_mostly_open, is_undetermined, refine, still_open,
-    without_step,
 };
 use crate::set_aside::set_aside;
 use crate::settings::{FitSettings, ImproveSettings, Method};
@@ -127,8 +126,8 @@ struct State {
     present: Model,
     /// When an expression is a candidate.
     discover: Discover,
-    /// What it was before the last step, and its steps then. What that step changed in earlier ones goes with it.
-    before: Option<(Model, Vec<ImprovementStep>)>,
+    /// What it was before each step, and its steps then. What a step changed in earlier ones goes with it.
+    before: Vec<(Model, Vec<ImprovementStep>)>,
     steps: Vec<ImprovementStep>,
     diagnoses: Vec<Diagnosis>,
     /// Whether the last step changed earlier ones, so that its errors are not those of the present model.
@@ -146,7 +145,7 @@ impl State {
         Self {
             present: model.clone(),
             discover,
-            before: None,
+            before: Vec::new(),
             steps: Vec::new(),
             diagnoses: Vec::new(),
             corrected: false,
@@ -246,7 +245,8 @@ impl State {
             twins,
             still_open: Vec::new(),
         });
-        self.before = Some((std::mem::replace(&mut self.present, best.model), steps));
+        let before = std::mem::replace(&mut self.present, best.model);
+        self.before.push((before, steps));
         self.fitted = None;
     }
 
@@ -282,7 +282,7 @@ impl State {
         work: &Work<'_>,
     ) -> Result<Option<Diagnosis>, FitError> {
         let (aim, now) = (self.aim(work), work.in_round(round));
-        let before = self.before.as_ref().map_or(&[][..], |(_, steps)| steps);
+        let before = self.before.last().map_or(&[][..], |(_, steps)| steps);
         let found = second_anew(&self.present, &self.steps, before, aim, measurements, &now)?;
         let is_added = |d: &Diagnosis| worth_adding(d, round, work.criteria()).is_ok();
         let found = found.filter(|(_, _, diagnosis)| is_added(diagnosis));
@@ -354,14 +354,14 @@ impl State {
             if present.cancelled || !idle && !may_blur {
                 return Ok(present);
             }
-            let Some((without, steps)) = self.without_last(&present.model) else {
+            let Some((without, _)) = self.before.last() else {
                 return Ok(present);
             };
-            let alone = fit_for(&without, measurements, settings, self.unaided(), work)?;
+            let alone = fit_for(without, measurements, settings, self.unaided(), work)?;
             if !idle && !blurs(&alone, &present, missing.undetermined, improve.blurs) {
                 return Ok(present);
             }
-            (self.present, self.steps) = (without, steps);
+            self.take_back();
             present = alone;
         }
     }
@@ -391,20 +391,12 @@ impl State {
 
     /// Takes the last step back. Whether there was one.
     fn take_back(&mut self) -> bool {
-        let without = self.without_last(&self.present.clone());
-        without.is_some_and(|(without, steps)| {
+        let before = self.before.pop();
+        before.is_some_and(|(without, steps)| {
             (self.present, self.steps) = (without, steps);
             self.fitted = None;
             true
         })
-    }
-
-    /// What there was before the last step; of earlier ones a `model` without its effect is made. None where there is no
-    /// such step.
-    fn without_last(&mut self, model: &Model) -> Option<(Model, Vec<ImprovementStep>)> {
-        let (last, earlier) = self.steps.split_last()?;
-        let without = without_step(model, last)?;
-        Some((self.before.take()).unwrap_or_else(|| (without, earlier.to_vec())))
     }
 
     /// The verdict on the steps that remain: that nothing is missing was said with all of them.
@@ -473,27 +465,31 @@ mod tests {
         };
         let step = ImprovementStep::at_shaft;
         let mut state = State::new(&of(8.0), Discover::Never);
-        state.steps = vec![step(None), step(Some("coulomb_friction"))];
         let with = of(1e9).with_effect("coulomb_friction", &["shaft"]).unwrap();
+        state.steps = vec![step(None), step(Some("coulomb_friction"))];
         let before = std::mem::replace(&mut state.present, with);
-        state.before = Some((before, vec![step(None)]));
+        state.before = vec![(before, vec![step(None)])];
         assert!(state.take_back());
         assert_eq!((state.steps.len(), state.present.effects.len()), (1, 0));
         assert_eq!(state.present.values(), of(8.0).values());
         assert!(!state.take_back(), "the model as it is is no step");
 
-        // What it had changed in an earlier step is as before.
-        let earlier = of(8.0).with_effect("directional_friction", &["shaft"]);
-        state.before = earlier.map(|m| (m, vec![step(None), step(Some("directional_friction"))]));
-        let both = of(8.0).with_effect("coulomb_friction", &["shaft"]);
-        state.present = both.unwrap().with_effect("end_stop", &["shaft"]).unwrap();
-        let names = [None, Some("coulomb_friction"), Some("end_stop")];
-        state.steps = names.map(step).to_vec();
-        assert!(state.take_back());
-        assert_eq!(
-            state.steps[1].added,
-            step(Some("directional_friction")).added
-        );
-        assert_eq!(state.present.effects[0].meta.id, "directional_friction");
+        // What each had changed in an earlier step is as before.
+        let names = [
+            "directional_friction",
+            "coulomb_friction",
+            "viscous_friction",
+        ];
+        for name in names {
+            let before = (state.present.clone(), state.steps.clone());
+            state.before.push(before);
+            state.present = of(8.0).with_effect(name, &["shaft"]).unwrap();
+            state.steps = vec![step(None), step(Some(name)), step(Some("end_stop"))];
+        }
+        for name in [names[1], names[0]] {
+            assert!(state.take_back());
+            assert_eq!(state.steps[1].added, step(Some(name)).added);
+            assert_eq!(state.present.effects[0].meta.id, name);
+        }
     }
 }

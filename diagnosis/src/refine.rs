@@ -175,7 +175,7 @@ pub(crate) fn blurs(alone: &Fit, with: &Fit, undetermined: f64, times: f64) -> b
 }
 
 /// The model without the effect of `step`; none where it has none of it.
-pub(crate) fn without_step(model: &Model, step: &ImprovementStep) -> Option<Model> {
+fn without_step(model: &Model, step: &ImprovementStep) -> Option<Model> {
     let instances = instances(model, step.added.as_ref()?);
     (!instances.is_empty()).then(|| without(model, &instances))?
 }
