@@ -5,18 +5,16 @@ use crate::criteria::Criteria;
 use crate::diagnose::{Aim, Discover, diagnose_for};
 use crate::early::Finding;
 use crate::error::FitError;
-use crate::estimate::stands_in;
 use crate::fit::fit_for;
 use crate::fitted::Fit;
+use crate::goes::Goes;
 use crate::improvement::{Improvement, ImprovementStep};
 use crate::measurements::Measurements;
 use crate::output_error::Unaided;
 use crate::pace::Paced;
 use crate::pairs::pair;
 use crate::progress::{Cancelled, Work};
-use crate::refine::{
-    blurs, estimated, has_the_effects_of, is_mostly_open, is_undetermined, refine, still_open,
-};
+use crate::refine::{has_the_effects_of, refine, still_open, without_step};
 use crate::set_aside::set_aside;
 use crate::settings::{FitSettings, ImproveSettings, Method};
 use crate::split::second_anew;
@@ -309,13 +307,7 @@ impl State {
         Ok(())
     }
 
-    /// The present model fitted to all of the log. A last step goes
-    ///
-    /// * while the log does not say how strong its effect is and the unseen error hardly fell with it: there is some
-    ///   effect for every imperfection, and it would take their values from the parameters that the log does determine;
-    /// * while the log leaves open most of its parameters, or one of them is at an end of where it is searched, and it explains
-    ///   no large part: it stands in for another effect;
-    /// * while something is missing with it, too, and it blurs what the log said of an earlier effect.
+    /// The present model fitted to all of the log, without last steps that do not stay there.
     fn settled(
         &mut self,
         measurements: &Measurements<'_>,
@@ -325,9 +317,6 @@ impl State {
             return Ok(settled);
         }
         let settings = &FitSettings::default();
-        let Criteria {
-            improve, missing, ..
-        } = work.criteria();
         let floor = self.diagnoses.last().map_or(0.0, |d| d.floor.nrmse);
         let mut present = loop {
             let known = self.fitted.take().map(Ok);
@@ -339,29 +328,23 @@ impl State {
             }
         };
         loop {
-            let [.., before, last] = &self.steps[..] else {
+            let goes = Goes::of(&present, &self.steps, floor, work.criteria());
+            let Some(goes) = goes.filter(|_| !present.cancelled) else {
                 return Ok(present);
             };
-            let fell_to = last.nrmse_test / before.nrmse_test;
-            let hardly = fell_to >= improve.better;
-            let incomplete = last.nrmse_test > missing.above_floor * floor;
-            let tradeable = fell_to >= improve.worth_blurring;
-            let idle = hardly && is_undetermined(&present, last, missing.undetermined)
-                || tradeable
-                    && (is_mostly_open(&present, last)
-                        || stands_in(estimated(&present, last).into_iter().map(|(_, e)| e)));
-            let may_blur = incomplete && tradeable;
-            if present.cancelled || !idle && !may_blur {
-                return Ok(present);
-            }
-            let Some((without, _)) = self.before.last() else {
+            let Some(without) = self.without_last(&present.model) else {
                 return Ok(present);
             };
-            let alone = fit_for(without, measurements, settings, self.unaided(), work)?;
-            if !idle && !blurs(&alone, &present, missing.undetermined, improve.blurs) {
+            let alone = fit_for(&without, measurements, settings, self.unaided(), work)?;
+            if !goes.from(&present, &alone, work.criteria()) {
                 return Ok(present);
             }
-            self.take_back();
+            if self.is_divided() {
+                self.steps.pop();
+                self.present = without;
+            } else {
+                self.take_back();
+            }
             present = alone;
         }
     }
@@ -389,7 +372,22 @@ impl State {
         Ok(Some((better, round)))
     }
 
-    /// Takes the last step back. Whether there was one.
+    /// Whether the last step is the second of two that one was made into.
+    fn is_divided(&self) -> bool {
+        let before = self.before.last();
+        let last = self.steps.last().filter(|last| last.round.is_none());
+        last.is_some() && before.is_some_and(|(_, before)| before.len() + 1 < self.steps.len())
+    }
+
+    /// What there is without the last step; of two that one was made into, without the second of them in `model`.
+    fn without_last(&self, model: &Model) -> Option<Model> {
+        match self.steps.last().filter(|_| self.is_divided()) {
+            Some(second) => without_step(model, second),
+            None => Some(self.before.last()?.0.clone()),
+        }
+    }
+
+    /// Takes back what the last round added. Whether there was something.
     fn take_back(&mut self) -> bool {
         let before = self.before.pop();
         before.is_some_and(|(without, steps)| {
@@ -465,28 +463,34 @@ mod tests {
         };
         let step = ImprovementStep::at_shaft;
         let mut state = State::new(&of(8.0), Discover::Never);
-        let with = of(1e9).with_effect("coulomb_friction", &["shaft"]).unwrap();
+        let with = |gain| {
+            of(gain)
+                .with_effect("coulomb_friction", &["shaft"])
+                .unwrap()
+        };
         state.steps = vec![step(None), step(Some("coulomb_friction"))];
-        let before = std::mem::replace(&mut state.present, with);
+        let before = std::mem::replace(&mut state.present, with(1e9));
         state.before = vec![(before, vec![step(None)])];
+        // Of two that one was made into, the second goes alone.
+        state.steps.push(step(Some("end_stop")));
+        let both = with(8.0).with_effect("end_stop", &["shaft"]).unwrap();
+        let left = |state: &State| state.without_last(&both).unwrap().effects.len();
+        assert_eq!(left(&state), 0);
+        state.steps[2].round = None;
+        assert_eq!(left(&state), 1);
         assert!(state.take_back());
         assert_eq!((state.steps.len(), state.present.effects.len()), (1, 0));
         assert_eq!(state.present.values(), of(8.0).values());
         assert!(!state.take_back(), "the model as it is is no step");
 
         // What each had changed in an earlier step is as before.
-        let names = [
-            "directional_friction",
-            "coulomb_friction",
-            "viscous_friction",
-        ];
-        for name in names {
+        for name in ["lugre_friction", "coulomb_friction", "end_stop"] {
             let before = (state.present.clone(), state.steps.clone());
             state.before.push(before);
             state.present = of(8.0).with_effect(name, &["shaft"]).unwrap();
             state.steps = vec![step(None), step(Some(name)), step(Some("end_stop"))];
         }
-        for name in [names[1], names[0]] {
+        for name in ["coulomb_friction", "lugre_friction"] {
             assert!(state.take_back());
             assert_eq!(state.steps[1].added, step(Some(name)).added);
             assert_eq!(state.present.effects[0].meta.id, name);

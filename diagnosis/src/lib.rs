@@ -97,6 +97,7 @@ mod fit;
 mod fitted;
 mod flatness;
 mod floor;
+mod goes;
 mod gram;
 mod growth;
 mod holdout;

@@ -2,14 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use loopsight_model::model::{Attached, Model, ModelParameter};
+use loopsight_model::model::{Attached, Model};
 use rayon::prelude::*;
 
 use crate::conclusion::{Diagnosis, Explanation};
 use crate::effect_at::{EffectAt, instances};
 use crate::error::FitError;
-use crate::estimate::{Estimate, ParameterVerdict, strength_is_determined};
-use crate::fitted::Fit;
 use crate::improvement::ImprovementStep;
 use crate::measurements::Measurements;
 use crate::progress::Work;
@@ -119,63 +117,8 @@ fn is_named_before(steps: &[ImprovementStep]) -> bool {
     last.is_some_and(|(last, earlier)| earlier.iter().any(|step| step.added == last.added))
 }
 
-/// Whether the log does not say how strong the effect of `step` is.
-pub(crate) fn is_undetermined(fit: &Fit, step: &ImprovementStep, undetermined: f64) -> bool {
-    !strength_is_determined(estimated(fit, step).into_iter(), undetermined)
-}
-
-/// Whether the log leaves open most of what is fitted of the effect of `step`: then it is a shape that suits the rest of the
-/// error, and not what is behind it.
-pub(crate) fn is_mostly_open(fit: &Fit, step: &ImprovementStep) -> bool {
-    let own = estimated(fit, step);
-    let fitted = own.iter().filter(|(parameter, _)| parameter.free);
-    let open = fitted
-        .clone()
-        .filter(|(_, e)| e.verdict != ParameterVerdict::Good);
-    2 * open.count() > fitted.count()
-}
-
-/// The parameters of the effect of `step`, with their estimates.
-pub(crate) fn estimated<'f>(
-    fit: &'f Fit,
-    step: &ImprovementStep,
-) -> Vec<(&'f ModelParameter, &'f Estimate)> {
-    let model = &fit.model;
-    let instances = step.added.iter().flat_map(|place| instances(model, place));
-    let of_effect = |i: usize| {
-        let effect = &model.effects[i];
-        let own = effect.own();
-        model.parameters[own].iter()
-    };
-    (instances.flat_map(of_effect))
-        .filter_map(|p| Some((p, fit.parameters.get(&p.name)?)))
-        .collect()
-}
-
-/// Whether an added effect takes from the log what it said of another one: a parameter of an effect that was determined
-/// in the fit `alone` has at least `times` the standard error in the fit `with` the added one.
-pub(crate) fn blurs(alone: &Fit, with: &Fit, undetermined: f64, times: f64) -> bool {
-    let effects = alone.model.effects.iter();
-    let mut names = effects.flat_map(|effect| &alone.model.parameters[effect.own()]);
-    names.any(|parameter| {
-        let estimates = [alone, with].map(|fit| fit.parameters.get(&parameter.name));
-        let [Some(before), Some(after)] = estimates else {
-            return false;
-        };
-        let Some(error) = before
-            .std_error
-            .filter(|_| before.is_determined(undetermined))
-        else {
-            return false;
-        };
-        after
-            .std_error
-            .is_none_or(|blurred| blurred >= times * error)
-    })
-}
-
 /// The model without the effect of `step`; none where it has none of it.
-fn without_step(model: &Model, step: &ImprovementStep) -> Option<Model> {
+pub(crate) fn without_step(model: &Model, step: &ImprovementStep) -> Option<Model> {
     let instances = instances(model, step.added.as_ref()?);
     (!instances.is_empty()).then(|| without(model, &instances))?
 }
@@ -392,7 +335,10 @@ mod tests {
 
     use std::collections::BTreeMap;
 
+    use loopsight_model::model::ModelParameter;
+
     use super::*;
+    use crate::estimate::{Estimate, ParameterVerdict};
 
     #[test]
     fn a_twin_begins_as_its_diagnosis_found_it() {
