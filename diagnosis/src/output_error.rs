@@ -19,7 +19,7 @@ use crate::progress::{Cancelled, Work};
 use crate::regression::batch;
 use crate::settings::{FitSettings, Method};
 use crate::solve::Effort;
-use crate::telling::attach_telling;
+use crate::telling::{Fitted, attach_telling};
 use crate::unshown::tied;
 
 /// Fits the free parameters and the initial states of all runs.
@@ -174,6 +174,11 @@ pub(crate) fn prepare<'a>(
         prepared.model = Cow::Owned(present);
         return Ok(prepared);
     }
+    let first = Fitted {
+        effort: ROUND,
+        values: values.clone(),
+        growth: growth.clone(),
+    };
     for share in ROUNDS {
         let mut shortened = growth.clone();
         shortened.horizon *= share;
@@ -185,7 +190,7 @@ pub(crate) fn prepare<'a>(
         // The observer stays, even if errors no longer grow with it: without it they would again.
         growth = self::growth(model, &values, runs, work)?.unwrap_or(growth);
     }
-    (prepared.runs, values) = attach_telling(&present, values, runs, &growth, Some(ROUND), work)?;
+    (prepared.runs, values) = attach_telling(&present, values, runs, &growth, Some(&first), work)?;
     present.set_values(&values);
     prepared.model = Cow::Owned(present);
     Ok(prepared)

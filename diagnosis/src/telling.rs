@@ -12,30 +12,44 @@ use crate::problem::Problem;
 use crate::progress::{Cancelled, Work};
 use crate::solve::Effort;
 
+/// How a model is fitted anew over each horizon.
+pub(crate) struct Fitted {
+    pub(crate) effort: Effort,
+    /// What it begins with, and how errors grow there: a fit over a horizon that was too long may have led far away.
+    pub(crate) values: Vec<f64>,
+    pub(crate) growth: Growth,
+}
+
 /// `runs` with the observer that suits `growth`, or with one that forgets sooner, and the values of `model` that go with it.
 ///
 /// A horizon says after what time an error of the state has grown too large. A model that lacks something drifts away sooner:
 /// what pushes a mass without a spring by a little more than the model says moves it by the square of the horizon. Over a horizon
-/// at whose end the model leaves as much as a constant would it tells nothing, so the horizon is halved until it leaves less. With
-/// an `effort` the model is fitted anew over each.
+/// with which the model leaves more than `start.stands` of the signal it tells little, so the horizon is halved until it leaves
+/// less. Where the model is `fitted`, it is so anew over each, from where it began: over a horizon that was too long a
+/// fit makes the pole of an upright pendulum so heavy that it no longer falls, and does not come back from there.
 pub(crate) fn attach_telling<'r>(
     model: &Model,
     values: Vec<f64>,
     runs: &'r [Run],
     growth: &Growth,
-    effort: Option<Effort>,
+    fitted: Option<&Fitted>,
     work: &Work<'_>,
 ) -> Result<(Cow<'r, [Run]>, Vec<f64>), Cancelled> {
+    let effort = fitted.map(|fitted| fitted.effort);
     let shortest = SHORTEST * shortest_period(runs);
     let (mut growth, mut values) = (growth.clone(), values);
     loop {
         let observed = attach_observer_for(model, &values, runs, &growth, work)?;
         let left = left(model, &mut values, &observed, effort, work)?;
-        let tells = left < work.criteria().start.hopeless;
+        let tells = left < work.criteria().start.stands;
         if tells || growth.horizon <= shortest || matches!(observed, Cow::Borrowed(_)) {
             return Ok((observed, values));
         }
-        growth.horizon = shortest.max(0.5 * growth.horizon);
+        let horizon = growth.horizon;
+        if let Some(fitted) = fitted {
+            (growth, values) = (fitted.growth.clone(), fitted.values.clone());
+        }
+        growth.horizon = shortest.max(0.5 * horizon.min(growth.horizon));
     }
 }
 
