@@ -258,7 +258,7 @@ fn steps(
     diagnosis.tell_compared(work);
     let moves = moves_starts(&plain.model, &plain.solution, runs, work)?;
     let nominal = Nominal {
-        given: model,
+        given: prepared.given(),
         model: &plain.model,
         solution: &plain.solution,
         cost: plain.cost,

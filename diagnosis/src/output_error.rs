@@ -124,7 +124,20 @@ impl Unaided {
 /// A model and recordings, ready for a fit.
 pub(crate) struct Prepared<'a> {
     pub(crate) model: Cow<'a, Model>,
+    /// The same with the values of the file, also where `model` has fitted ones.
+    unfitted: Cow<'a, Model>,
     pub(crate) runs: Cow<'a, [Run]>,
+}
+
+impl Prepared<'_> {
+    /// The model as it was given; where values are missing there, with those that it was fitted to first.
+    pub(crate) fn given(&self) -> &Model {
+        if self.unfitted.missing_values().is_empty() {
+            &self.unfitted
+        } else {
+            &self.model
+        }
+    }
 }
 
 /// Horizons of the rounds of a fit with an observer, as shares of the last one. Each round designs the observer
@@ -158,6 +171,7 @@ pub(crate) fn prepare<'a>(
     let mut prepared = Prepared {
         runs: Cow::Borrowed(runs),
         model: model.clone(),
+        unfitted: model.clone(),
     };
     let model = &*model;
     let Some(mut values) = first_values(model, runs, settings, work)? else {

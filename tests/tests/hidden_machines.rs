@@ -80,7 +80,7 @@ fn a_spring_is_found_where_its_position_is_measured() {
 /// becomes another machine.
 #[test]
 fn friction_is_found_of_a_cart_that_sticks_below_its_pole() {
-    for seed in [5, 6] {
+    for seed in [2, 626] {
         let found = missing(Robot::CartPole, (Hidden::CoulombFriction, 2.0), seed);
         assert_eq!(found.as_deref(), Some("coulomb_friction"), "{seed}");
     }
