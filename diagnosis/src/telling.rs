@@ -24,9 +24,12 @@ pub(crate) struct Fitted {
 ///
 /// A horizon says after what time an error of the state has grown too large. A model that lacks something drifts away sooner:
 /// what pushes a mass without a spring by a little more than the model says moves it by the square of the horizon. Over a horizon
-/// with which the model leaves more than `start.stands` of the signal it tells little, so the horizon is halved until it leaves
-/// less. Where the model is `fitted`, it is so anew over each, from where it began: over a horizon that was too long a
-/// fit makes the pole of an upright pendulum so heavy that it no longer falls, and does not come back from there.
+/// with which the model leaves as much as a constant would (`start.hopeless`) it tells nothing, so the horizon is halved until it
+/// leaves less.
+///
+/// Where the model is `fitted`, it must leave less than `start.stands`, and is fitted anew over each horizon, from where it
+/// began: over a horizon that was too long a fit makes the pole of an upright pendulum so heavy that it no longer falls, and
+/// does not come back from there.
 pub(crate) fn attach_telling<'r>(
     model: &Model,
     values: Vec<f64>,
@@ -36,12 +39,14 @@ pub(crate) fn attach_telling<'r>(
     work: &Work<'_>,
 ) -> Result<(Cow<'r, [Run]>, Vec<f64>), Cancelled> {
     let effort = fitted.map(|fitted| fitted.effort);
+    let start = &work.criteria().start;
+    let most = fitted.map_or(start.hopeless, |_| start.stands);
     let shortest = SHORTEST * shortest_period(runs);
     let (mut growth, mut values) = (growth.clone(), values);
     loop {
         let observed = attach_observer_for(model, &values, runs, &growth, work)?;
         let left = left(model, &mut values, &observed, effort, work)?;
-        let tells = left < work.criteria().start.stands;
+        let tells = left < most;
         if tells || growth.horizon <= shortest || matches!(observed, Cow::Borrowed(_)) {
             return Ok((observed, values));
         }

@@ -55,7 +55,7 @@ criteria! {
         lost: f64 = 0.3 "1", Judgement: "missing physics seldom leaves more after a fit that converged";
         /// Another start counts as better below this ratio of errors.
         further: f64 = 0.98 "1", Judgement: "two per cent: a smaller gain is the same minimum reached another way";
-        /// Error of a fit without an observer below which none is needed, and of one with an observer from which its horizon is too long.
+        /// Error of a fit without an observer below which none is needed, and of one with an observer above which its horizon is too long.
         stands: f64 = 0.6 "1", Judgement: "the inputs then explain more than half of the signal";
         /// Error from which the model counts as not fitted: it leaves as much as a constant would.
         hopeless: f64 = 0.99 "1", Derived: "the mean of the signal leaves 1, and one per cent of an error does not matter";
